@@ -133,7 +133,7 @@ class Evidence:
         if a is None or self.flat is None:
             return 0.0, np.inf
         n = max(round(BLOCK_S * r.rate_hz), 1)
-        turns = lengths(block_means(r.gyr - self.flat.b_omega, n))[1:-1] > MOVING_RAD_S
+        turns = lengths(block_means(r.gyr, n) - self.flat.b_omega)[1:-1] > MOVING_RAD_S
         size = lengths(block_means(a, n)) - self.gravity
         away, bent = np.abs(size[1:-1])[turns], np.abs(np.diff(size, n=2))[turns]
         return (float(np.median(away)), float(np.median(bent))) if len(away) else (0.0, np.inf)

@@ -21,7 +21,7 @@ from .fit import Fit
 from .hand import PASSES, HandFit, fit_hand
 from .hypothesis_tests import MOST_STD, WALD_99, HandEffects, find_hand_effects, undetermined, wald
 from .initial_estimate import initialise
-from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
+from .levenberg_marquardt import LAST, MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
@@ -169,9 +169,13 @@ class InPlaceFits:
         return minimum, errors
 
     def _minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
-        """Search on all samples from the end of a rough search; if that did not converge, evaluate without a step."""
+        """Search on all samples from the end of a rough search; if that did not converge, evaluate without a step.
+
+        Without K, which turns may hardly show, V is so nearly quadratic that its first evaluation mostly is the last.
+        """
         problem, most = _with_errors(self._problem, errors), MOST_ITERATIONS if near.converged else 0
-        minimum = minimise(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
+        search = partial(minimise, unseen=5.0 * LAST) if parameters == ACCEL else minimise
+        minimum = search(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def _fit_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:

@@ -23,8 +23,8 @@ def judge(evidence: Evidence) -> Quality:
     return {
         "verdict": verdict(reasons),
         "reasons": [reason.document() for reason in reasons],
-        "magnitude_before": _magnitude(evidence.recording.acc),
-        "magnitude_after": _magnitude(evidence.calibrated),
+        "magnitude_before": _magnitude(evidence.magnitude),
+        "magnitude_after": _magnitude(None if evidence.calibrated is None else lengths(evidence.calibrated)),
         "error_std": _error_std(evidence),
     }
 
@@ -48,8 +48,7 @@ def verdict(reasons: list[Reason]) -> Verdict:
     return REFUSED if any(reason.refuse for reason in reasons) else USABLE if reasons else GOOD
 
 
-def _magnitude(acc: Vector | None) -> Magnitude:
-    if acc is None:
+def _magnitude(a: Vector | None) -> Magnitude:
+    if a is None:
         return {"median": np.nan, "mean": np.nan, "std": np.nan}
-    a = lengths(acc)
     return {"median": float(np.median(a)), "mean": float(a.mean()), "std": float(a.std())}

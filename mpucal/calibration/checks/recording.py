@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
-from ...data import Mask
+from ...data import Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.limits import NOISIEST_ACC_MPS2, TIMES_NOISE, VIBRATING_MPS2
@@ -83,8 +83,12 @@ def gyroscope_frozen(e: Evidence) -> Reason | None:
 @once
 def _frozen_rates(e: Evidence) -> list[Stuck]:
     """Return where rates repeat while the accelerometer goes on; otherwise whole samples repeat, and are lost."""
-    moves = np.any(np.diff(e.recording.acc, axis=0), axis=1)
-    return [run for run in stuck_readings(e.recording, "gyr") if moves[run.first - 1 : run.last - 2].mean() > 0.5]
+    return [run for run in stuck_readings(e.recording, "gyr") if _moves(e.recording.acc[run.first - 1 : run.last - 1])]
+
+
+def _moves(acc: Vector) -> bool:
+    """Return True if most readings (n, 3) differ from the one before."""
+    return bool(np.any(np.diff(acc, axis=0), axis=1).mean() > 0.5)
 
 
 def _unexplained_gaps(e: Evidence) -> Mask:

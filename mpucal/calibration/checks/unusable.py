@@ -80,7 +80,8 @@ def same_magnitude(e: Evidence) -> Reason | None:
 
 def two_sensors(e: Evidence) -> Reason | None:
     """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest."""
-    readings = np.hstack([e.recording.acc, e.recording.gyr])[e.rest.first : e.rest.last]
+    at_rest = slice(e.rest.first, e.rest.last)
+    readings = np.hstack([e.recording.acc[at_rest], e.recording.gyr[at_rest]])
     size = len(readings) // (2 * FEWEST_SAMPLES)
     if not size:
         return None
