@@ -5,7 +5,7 @@ python -m tools.lab dialects --only '*ROS*'
 """
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from runpy import run_path
@@ -116,9 +116,14 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def scenarios(*, only: Annotated[str, "those with such names, patterns with ; between"] = "*") -> list[str]:
+def named(patterns: str) -> list[str]:
+    """Return the names of the dialects that match patterns; see names_of."""
+    return names_of(dialects())(patterns)
+
+
+def scenarios(*, only: Annotated[Sequence[str], named, "patterns, with ; between"] = "*") -> Sequence[str]:
     """Return the names of dialects."""
-    return names_of(dialects())(only)
+    return only
 
 
 main = Trial(__doc__, of_dialect, scenarios, COLUMNS)
