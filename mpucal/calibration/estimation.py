@@ -20,7 +20,6 @@ from .hand import HandFit
 from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
-from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .sensitivity import Sensitivity, find_sensitivity
 from .static import fit_static
 from .transitions import FEWEST_TRANSITIONS
@@ -152,10 +151,8 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
         fitted = _Fitted(sensitivity.removed_from(recording, flat), (flat, gravity, model))
     fitted = without_changes(fitted)
     choice, plain = fitted.choice, fitted.choice.plain
-    # the share of the variance that the removed changes added
-    freed = sum((change.freed[ACCELEROMETER] for change in fitted.changes), np.zeros(len(D_NAMES + B_A_NAMES)))
     fit = choice.honest() if sensitivity is None else sensitivity.held_by(choice.honest())
-    claim = claim_uncertainty(fit, gravity, explain(plain.parts, plain.D, fitted.explanations), freed)
+    claim = claim_uncertainty(fit, gravity, explain(plain.parts, plain.D, fitted.explanations), fitted.changes)
     fit = inflate(fit, claim).right_handed()
     evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=fitted.changes)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"

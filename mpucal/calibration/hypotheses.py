@@ -106,7 +106,7 @@ class Explanation(NamedTuple):
     start, end : (k,) s after the flat segment, of the groups.
     aways : (m, p) rms distances of the estimate from the parameters, if it is true; of a change, by group.
     shift : (1 + k, p) parameters less the estimate, before the first group and in each, at the likeliest q and time.
-    freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too, at the likeliest q.
+    likeliest : index of the likeliest shape. q : likeliest variance of x.
     weight : probability among all hypotheses and nothing.
     is_sure : True for a change of the accelerometer against which all else is unlikely.
     is_possible : True if something surely happened, and this explains it, or nearly as much of it as the likeliest one.
@@ -119,7 +119,8 @@ class Explanation(NamedTuple):
     end: Vector
     aways: Vector
     shift: Vector
-    freed: Vector
+    likeliest: int
+    q: float
     weight: float = 0.0
     is_sure: bool = False
     is_possible: bool = False
@@ -154,11 +155,6 @@ class Explanation(NamedTuple):
     def middles(self) -> Vector:
         """Middles of the groups (k,) [s after the flat segment]."""
         return 0.5 * (self.start + self.end)
-
-    def at(self, t: Vector) -> Vector:
-        """Return (n, 3) values, interpolated linearly between the middles, from 0 where the turning begins."""
-        at, delta = np.concatenate([[0.0], self.middles]), np.vstack([np.zeros(3), self.delta])
-        return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
 def rank(parts: Parts | None, D: Vector, hypotheses: Sequence[Hypothesis] = HYPOTHESES) -> list[Explanation]:
@@ -224,8 +220,15 @@ def gyroscope_change(explanations: Sequence[Explanation]) -> Explanation | None:
 
 
 def remove_change(recording: Recording, flat: Flat, change: Explanation) -> Recording:
-    """Subtract a change of the gyroscope's bias from the rates."""
-    return replace(recording, gyr=recording.gyr - change.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
+    """Subtract a change of the gyroscope's bias from the rates after the flat segment.
+
+    It is interpolated linearly between the middles of the groups. The flat mean is the bias in that segment's middle.
+    """
+    t = recording.t - recording.t[flat.last - 1]
+    at, delta = np.append(0.5 * t[flat.first], change.middles), np.vstack([np.zeros(3), change.delta])
+    drift = np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
+    drift[: flat.last] = 0.0
+    return replace(recording, gyr=recording.gyr - drift)
 
 
 class _Groups(NamedTuple):
@@ -328,21 +331,40 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
         likeliest, strays = x[k, m, best], likelihood.strays[k, m]
         delta = np.sum(shapes[m] * (likelihood.U[k, m] @ likeliest), axis=1)
         shift = delta @ B[k].T - likeliest @ strays
-        freed = variance[k, m, best] @ strays**2 / np.diag(parts.covariance)
-        times = groups.start, groups.end
-        found.append(Explanation(hypothesis, float(evidence[k]), delta[1:], *times, away[k], shift, freed))
+        about = groups.start, groups.end, away[k], shift, m, float(q[k, 0, best, 0])
+        found.append(Explanation(hypothesis, float(evidence[k]), delta[1:], *about))
     return found
 
 
 def nonlinearity(parts: Parts, D: Vector) -> Vector:
-    """Return (p,) variances of the estimate by a nonlinearity of NONLINEARITY_MPS2 that the parts do not show."""
+    """Return the covariance (p, p) of the estimate by a nonlinearity of NONLINEARITY_MPS2, as far as it is not seen."""
     if not parts.is_finite:
-        return np.full(len(parts.H), np.nan)
+        return np.full_like(parts.H, np.nan)
     groups = _Groups.of(parts, GROUPS["reading"])
-    B = _directions("linearity", D, len(parts.H))[None]
-    likelihood = _Likelihood.of(B, _shapes("reading", groups), groups, parts)
-    variance = 1.0 / (likelihood.eigenvalues + NONLINEARITY_MPS2**-2.0)
-    return np.asarray((variance[:, :, None] @ likelihood.strays**2).ravel())
+    return _unseen("linearity", NONLINEARITY_MPS2**2, _shapes("reading", groups), groups, parts, D)
+
+
+def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector) -> Vector:
+    """Return the covariance (p, p) of the estimate by what the parts do not show of changes that were removed.
+
+    What the parts do not show may be as large as the largest change. A walk goes on within its groups, and a change
+    there passes for another mount where a machine turns evenly: it has an x in each part.
+    """
+    total = np.zeros_like(parts.H)
+    largest = {each.hypothesis: each for each in sorted(changes, key=lambda each: each.q)}
+    for hypothesis, change in largest.items():
+        groups = _Groups.of(parts, len(parts) if hypothesis.shape == "walk" else GROUPS[hypothesis.shape])
+        shape = _shapes(hypothesis.shape, groups)[change.likeliest][None]
+        total += _unseen(hypothesis.what, change.q, shape, groups, parts, D)
+    return total
+
+
+def _unseen(what: What, q: float, shapes: Vector, groups: _Groups, parts: Parts, D: Vector) -> Vector:
+    """Return the covariance (p, p) of the estimate by x of variance q in each shape, as far as the parts leave it."""
+    likelihood = _Likelihood.of(_directions(what, D, len(parts.H))[None], shapes, groups, parts)
+    left = likelihood.strays / np.sqrt(likelihood.eigenvalues + 1.0 / q)[..., None]
+    left = left.reshape(-1, left.shape[-1])
+    return left.T @ left
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:

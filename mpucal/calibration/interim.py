@@ -99,7 +99,7 @@ def interim_estimate(
     H = information(admitted, minimum.theta, prior)
     covariance, parts = replace(minimum, H=H).covariance(), parts_of(problem, minimum, prior)
     if parts is not None:
-        covariance += np.diag(nonlinearity(parts, minimum.theta.D))
+        covariance += nonlinearity(parts, minimum.theta.D)
     covariance = covariance[ACCELEROMETER, ACCELEROMETER]
     sigma = most_likely_sigma(prepared.white, CALM_MPS2, minimum.theta, max(sigma, CALM_MPS2[0]))
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged, compared)

@@ -20,7 +20,8 @@ from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import PASSES
-from .hypotheses import SURE, Explanation, gyroscope_change, rank
+from .hypotheses import SURE, Explanation, gyroscope_change, rank, unseen_changes
+from .hypothesis_tests import most_chi2
 from .likelihood import evaluate, part_scores
 from .model_selection import HOPELESS_NIS
 from .normal_equations import inverse
@@ -90,17 +91,20 @@ def find_sensitivity(
     assert found.to_ends is not None
     # The gyroscope's bias may change besides.
     scores = part_scores(less, before, SENSITIVE, found.to_ends).moved(step)
-    beside = rank(with_times(less, theta, scores, H, np.zeros(SENSITIVE)), theta.D)
+    parts = with_times(less, theta, scores, H, np.zeros(SENSITIVE))
+    beside = rank(parts, theta.D)
     evidence += np.logaddexp.reduce([0.0, *(each.log_share for each in beside)])
-    change, freed = gyroscope_change(beside), np.ones(SENSITIVE - HAND)
+    change = gyroscope_change(beside)
     if change is not None:
-        s, freed = s + change.shift[0, HAND:], np.sqrt(1.0 + change.freed[HAND:])
+        s, C = s + change.shift[0, HAND:], C + unseen_changes([change], parts, theta.D)
         left -= 2.0 * change.evidence
-    if not left < HOPELESS_NIS * len(series):
+    # No chip feels so much; a drift on a machine that turns evenly passes for it.
+    beyond = s @ s > most_chi2(len(s)) * SENSITIVITY_SD**2
+    if beyond or not left < HOPELESS_NIS * len(series):
         return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))
     removed = weight if weight > 0.5 else 0.0
-    carried = C[:HAND, HAND:] @ known
+    carried = C[:HAND, HAND:] @ inverse(C[HAND:, HAND:])
     apart = weight * (1.0 - removed) ** 2 + (1.0 - weight) * removed**2
-    covariance = weight * C[HAND:, HAND:] * np.outer(freed, freed) + apart * np.outer(s, s)
+    covariance = weight * C[HAND:, HAND:] + apart * np.outer(s, s)
     return Sensitivity(removed * s.reshape(3, 3), carried @ covariance @ carried.T)

@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Vector
 from ..result.blob import is_invertible
 from .fit import Fit
-from .hypotheses import Explanation, Kind, nonlinearity
+from .hypotheses import Explanation, Kind, nonlinearity, unseen_changes
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
@@ -128,24 +128,20 @@ class UncertaintyClaim:
 
 
 def claim_uncertainty(
-    fit: Fit, gravity: float, explanations: Sequence[Explanation], freed: Vector
+    fit: Fit, gravity: float, explanations: Sequence[Explanation], removed: Sequence[Explanation]
 ) -> UncertaintyClaim | None:
     """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
 
-    explanations : of the fit's parts. freed : (12,) share of the variance that changes of the gyroscope's bias
-        added, which were removed.
+    explanations : of the fit's parts. removed : changes of the gyroscope's bias that were removed before the fit.
     """
     if fit.parts is None or not is_usable(fit):
         return None
     # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
     rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
-    covariance = fit.covariance + np.diag(nonlinearity(fit.parts, fit.D))  # no sensor is perfectly linear
-    if freed.any():
-        grown = np.ones(len(covariance))
-        grown[ACCELEROMETER] = np.sqrt(1.0 + freed)
-        covariance = covariance * np.outer(grown, grown)
+    covariance = fit.covariance + nonlinearity(fit.parts, fit.D)  # no sensor is perfectly linear
+    covariance = covariance + unseen_changes(removed, fit.parts, fit.D)
     model = floored = rms(covariance)
-    if freed.any():
+    if removed:
         floored = float(np.hypot(model, FLOOR_MPS2))
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED

@@ -139,7 +139,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
     B = np.zeros((p, 3))
     B[PLACES["b_a"]] = np.eye(3)
     minimum = np.linalg.solve(parts.H, design.T @ y)
-    logs, squares, freed = [], [], []
+    logs, squares, unseen = [], [], []
     for of in (each * np.ones(3) for each in shapes):
         for q in LARGEST["accelerometer"] ** 2 * VARIANCES:
             # by the normal equations of x and the parameters in the flat segment, which is in no part
@@ -153,17 +153,17 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
             variance = np.diagonal(to @ covariance @ to.swapaxes(1, 2), axis1=1, axis2=2)
             squares.append(variance - np.diag(parts.covariance) + (to @ mean - minimum) ** 2)
             of_flat = to[0] if shape in ("pulse", "reading") else np.eye(*to[0].shape)
-            freed.append(np.diag(of_flat @ covariance @ of_flat.T) / np.diag(parts.covariance) - 1.0)
+            unseen.append(of_flat @ covariance @ of_flat.T - parts.covariance)
             marginal = np.eye(k * m) + design @ design.T + q * of_x @ of_x.T
             logs.append(-0.5 * (np.linalg.slogdet(marginal)[1] + y @ np.linalg.solve(marginal, y)))
     without = np.eye(k * m) + design @ design.T
     none = -0.5 * (np.linalg.slogdet(without)[1] + y @ np.linalg.solve(without, y))
     assert explained.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
-    np.testing.assert_allclose(explained.freed, freed[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
-    if shape == "reading":  # of a known size, an unseen nonlinearity adds as much
+    removed = hypotheses.unseen_changes([explained, explained._replace(q=0.0)], parts, np.eye(3))
+    np.testing.assert_allclose(removed, unseen[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
+    if shape == "reading":  # a nonlinearity of a known size adds as much
         monkeypatch.setattr(hypotheses, "NONLINEARITY_MPS2", LARGEST["accelerometer"])
-        unseen = hypotheses.nonlinearity(parts, np.eye(3)) / np.diag(parts.covariance)
-        np.testing.assert_allclose(unseen, freed[-1], rtol=1e-6)
+        np.testing.assert_allclose(hypotheses.nonlinearity(parts, np.eye(3)), unseen[-1], rtol=1e-6, atol=1e-12)
     weights = np.exp(np.array(logs) - max(logs))
     expected = np.tensordot(weights, squares, 1) / weights.sum()
     np.testing.assert_allclose(explained.aways**2, expected, rtol=1e-6)
@@ -182,7 +182,7 @@ def test_faces_of_a_cube_do_not_show_a_cube_of_the_readings():
     k, p = len(A), A.shape[2]
     t, gradient = np.arange(k, dtype=float), np.zeros((k, p))
     parts = Parts(gradient, fisher, fisher.sum(0) + np.eye(p), np.zeros(p), t, t + 1.0, np.vstack([faces[2], faces]))
-    std = np.sqrt(hypotheses.nonlinearity(parts, np.eye(3)))
+    std = np.sqrt(np.diag(hypotheses.nonlinearity(parts, np.eye(3))))
     cube = (1.0 - 3.0 / 5.0) * hypotheses.NONLINEARITY_MPS2 / STANDARD_GRAVITY_MPS2
     np.testing.assert_allclose(std[[0, 4, 8]], cube, rtol=1e-3)
     assert np.delete(std, [0, 4, 8]).max() < 0.02 * cube
