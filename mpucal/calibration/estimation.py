@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
@@ -17,7 +17,7 @@ from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_faul
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
-from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
+from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change, unseen_changes
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
 from .sensitivity import Sensitivity, find_sensitivity
@@ -152,7 +152,8 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     fitted = without_changes(fitted)
     choice, plain = fitted.choice, fitted.choice.plain
     fit = choice.honest() if sensitivity is None else sensitivity.held_by(choice.honest())
-    claim = claim_uncertainty(fit, gravity, explain(plain.parts, plain.D, fitted.explanations), fitted.changes)
+    explanations = explain(plain.parts, plain.D, fitted.explanations)
+    claim = claim_uncertainty(fit, gravity, explanations, fitted.left_by_changes())
     fit = inflate(fit, claim).right_handed()
     evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=fitted.changes)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
@@ -178,6 +179,14 @@ class _Fitted:
         """Changes that were removed before the fit; a hand's fit removes changes itself."""
         found = self.choice.found
         return self._changes + (found.changes if isinstance(found, HandFit) else ())
+
+    def left_by_changes(self) -> Vector | float:
+        """Return the covariance (p, p) of the estimate by what the parts do not show of the removed changes."""
+        plain, found = self.choice.plain, self.choice.found
+        if plain.parts is None:
+            return 0.0
+        rests_often = isinstance(found, HandFit) and found.fine.rests_often
+        return unseen_changes(self.changes, plain.parts, plain.D, rests_often)
 
     def find_sensitivity(self) -> Sensitivity | None:
         """Return the gyroscope's sensitivity to acceleration that no rest shows; None if there is none, or a hand."""

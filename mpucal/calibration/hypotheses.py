@@ -338,22 +338,21 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
 
 def nonlinearity(parts: Parts, D: Vector) -> Vector:
     """Return the covariance (p, p) of the estimate by a nonlinearity of NONLINEARITY_MPS2, as far as it is not seen."""
-    if not parts.is_finite:
-        return np.full_like(parts.H, np.nan)
     groups = _Groups.of(parts, GROUPS["reading"])
     return _unseen("linearity", NONLINEARITY_MPS2**2, _shapes("reading", groups), groups, parts, D)
 
 
-def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector) -> Vector:
+def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector, rests_often: bool) -> Vector:
     """Return the covariance (p, p) of the estimate by what the parts do not show of changes that were removed.
 
-    What the parts do not show may be as large as the largest change. A walk goes on within its groups, and a change
-    there passes for another mount where a machine turns evenly: it has an x in each part.
+    That may be as large as the largest change. Between rests, a walk has an x in each group. Where a machine turns
+    evenly, a walk within a group passes for another mount, and it has an x in each part.
     """
     total = np.zeros_like(parts.H)
     largest = {each.hypothesis: each for each in sorted(changes, key=lambda each: each.q)}
     for hypothesis, change in largest.items():
-        groups = _Groups.of(parts, len(parts) if hypothesis.shape == "walk" else GROUPS[hypothesis.shape])
+        is_fine = hypothesis.shape == "walk" and not rests_often
+        groups = _Groups.of(parts, len(parts) if is_fine else GROUPS[hypothesis.shape])
         shape = _shapes(hypothesis.shape, groups)[change.likeliest][None]
         total += _unseen(hypothesis.what, change.q, shape, groups, parts, D)
     return total
@@ -361,6 +360,8 @@ def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector) -> V
 
 def _unseen(what: What, q: float, shapes: Vector, groups: _Groups, parts: Parts, D: Vector) -> Vector:
     """Return the covariance (p, p) of the estimate by x of variance q in each shape, as far as the parts leave it."""
+    if not parts.is_finite:
+        return np.full_like(parts.H, np.nan)
     likelihood = _Likelihood.of(_directions(what, D, len(parts.H))[None], shapes, groups, parts)
     left = likelihood.strays / np.sqrt(likelihood.eigenvalues + 1.0 / q)[..., None]
     left = left.reshape(-1, left.shape[-1])

@@ -96,7 +96,7 @@ def find_sensitivity(
     evidence += np.logaddexp.reduce([0.0, *(each.log_share for each in beside)])
     change = gyroscope_change(beside)
     if change is not None:
-        s, C = s + change.shift[0, HAND:], C + unseen_changes([change], parts, theta.D)
+        s, C = s + change.shift[0, HAND:], C + unseen_changes([change], parts, theta.D, prepared.rests_often)
         left -= 2.0 * change.evidence
     # No chip feels so much; a drift on a machine that turns evenly passes for it.
     beyond = s @ s > most_chi2(len(s)) * SENSITIVITY_SD**2

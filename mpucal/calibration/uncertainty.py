@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Vector
 from ..result.blob import is_invertible
 from .fit import Fit
-from .hypotheses import Explanation, Kind, nonlinearity, unseen_changes
+from .hypotheses import Explanation, Kind, nonlinearity
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
@@ -128,20 +128,19 @@ class UncertaintyClaim:
 
 
 def claim_uncertainty(
-    fit: Fit, gravity: float, explanations: Sequence[Explanation], removed: Sequence[Explanation]
+    fit: Fit, gravity: float, explanations: Sequence[Explanation], removed: Vector | float = 0.0
 ) -> UncertaintyClaim | None:
     """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
 
-    explanations : of the fit's parts. removed : changes of the gyroscope's bias that were removed before the fit.
+    explanations : of the fit's parts. removed : (p, p) covariance by removed changes of the gyroscope's bias.
     """
     if fit.parts is None or not is_usable(fit):
         return None
     # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
     rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
-    covariance = fit.covariance + nonlinearity(fit.parts, fit.D)  # no sensor is perfectly linear
-    covariance = covariance + unseen_changes(removed, fit.parts, fit.D)
+    covariance = fit.covariance + removed + nonlinearity(fit.parts, fit.D)  # no sensor is perfectly linear
     model = floored = rms(covariance)
-    if removed:
+    if np.any(removed):
         floored = float(np.hypot(model, FLOOR_MPS2))
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED

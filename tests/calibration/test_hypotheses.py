@@ -159,7 +159,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
     without = np.eye(k * m) + design @ design.T
     none = -0.5 * (np.linalg.slogdet(without)[1] + y @ np.linalg.solve(without, y))
     assert explained.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
-    removed = hypotheses.unseen_changes([explained, explained._replace(q=0.0)], parts, np.eye(3))
+    removed = hypotheses.unseen_changes([explained, explained._replace(q=0.0)], parts, np.eye(3), False)
     np.testing.assert_allclose(removed, unseen[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
     if shape == "reading":  # a nonlinearity of a known size adds as much
         monkeypatch.setattr(hypotheses, "NONLINEARITY_MPS2", LARGEST["accelerometer"])
