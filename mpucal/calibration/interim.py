@@ -114,6 +114,5 @@ def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
-    # The next orientation depends on H, which is therefore evaluated at the estimate itself.
-    search = partial(minimise, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True, unseen=0.0)
+    search = partial(minimise, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True)
     return search(problem, theta, HAND, prior, ends=ends_of(problem))
