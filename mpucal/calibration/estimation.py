@@ -33,10 +33,10 @@ NOTHING = {"why": "nothing could be estimated"}
 def estimate(
     recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
 ) -> tuple[Evidence, Mapping[str, str]]:
-    """Estimate as `calibrate` does; return the evidence, with the fit and its covariance, and the model and why.
+    """Estimate as `calibrate` does; return the evidence with the fit, and the model's name with why it was chosen.
 
     Where the gyroscope is at fault and the rests suffice, the estimate uses the rests alone. Where the sensor changed,
-    or was at the end of its range, and a part without that is good by itself, the estimate uses that part.
+    or reached the end of its range, and the part before or after that is good by itself, it uses that part alone.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def estimate(
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
         if missing is not None:
             return replace(whole[0], against_rests=refusing), whole[1]
-        # other faults of the gyroscope can be mended, and then the rests need not be enough
+        # Other faults of the gyroscope can be mended. Then the rests need not suffice, and their lack is not reported.
         return _of_a_part(whole[0]) or whole
     if _is_doubtful(whole[0], at_fault, of_rests):
         return _of_a_part(whole[0]) or whole
@@ -72,13 +72,16 @@ def estimate(
 
 
 def _is_doubtful(whole: Evidence, at_fault: Reason, of_rests: Evidence) -> bool:
-    """Return True if a slip may contradict the gyroscope, as no gap does, and the rests are too few to show it."""
+    """Return True if a slip of the mount may be the reason why the rests contradict the gyroscope.
+
+    Where samples are missing, that explains the contradiction instead; and enough rests would show a slip.
+    """
     is_few = of_rests.estimate.freedom < FEWEST_TRANSITIONS
     return is_few and not whole.recording.gap.any() and at_fault == CONTRADICTED.reason(whole)
 
 
 def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
-    """Return True for a trustworthy estimate that claims a smaller uncertainty than the other."""
+    """Return True if an estimate is trustworthy and claims a smaller uncertainty than the other."""
     own, others = (np.inf if of.uncertainty is None else of.uncertainty.rms_mps2 for of in (evidence, other))
     return is_trustworthy(evidence) and own < others
 
@@ -86,10 +89,10 @@ def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
 def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
 
-    The part after what changed the sensor is of what it is now. Where that part is not good, the uncertainty of the
-    whole holds what the sensor was and what it is. Where the whole has no fit, as after an axis froze, the part before
-    is used, too. The part before a sensor was at the end of its range needs no reservation, and need not be better than
-    usable where the whole is refused.
+    After a change of the sensor, only the later part describes the sensor as it is now, so it is the one to use. Where
+    it is not good, the whole stays: its uncertainty covers the sensor before and after. Where the whole has no fit, as
+    after an axis froze, the earlier part is used if the later one is not good. Where a sensor only reached the end of
+    its range, the part before is used, without a reservation; if the whole is refused, that part may be usable only.
     """
     recording, flat, of_whole = whole.recording, whole.flat, find_reasons(whole)
     changed = next((reason for reason in of_whole if reason.span is not None), None)
@@ -122,7 +125,7 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
 def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
     """Return the estimate from the rests alone; without a fit where the recording does not begin with a rest.
 
-    The rates may be another board's, and show no rests either.
+    The rests are found without the rates, too: a faulty gyroscope's, or another board's, do not show them.
     """
     recording = replace(before.recording, gyr=np.full_like(before.recording.gyr, np.nan))
     segment = recording.flat or find_flat(recording)
@@ -135,6 +138,10 @@ def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
 
 
 def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
+    """Return the estimate by the requested model, and the model's name with why; what follows a reset is left out.
+
+    Its covariance includes what the explanations say, and the changes of the gyroscope's bias that were removed.
+    """
     recording, gravity, model = before.recording, before.gravity, before.model
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
@@ -161,7 +168,10 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
 
 
 class _Fitted:
-    """Fit by the requested model, with the hypotheses that explain its residuals, the likeliest first."""
+    """Fit by the requested model, with the explanations of its residuals, the likeliest first.
+
+    of : flat segment, gravity and model, with which each recording is fitted. changes : removed from the recording.
+    """
 
     def __init__(
         self,
@@ -176,12 +186,12 @@ class _Fitted:
 
     @property
     def changes(self) -> tuple[Explanation, ...]:
-        """Changes that were removed before the fit; a hand's fit removes changes itself."""
+        """Changes of the gyroscope's bias that were removed for the fit; a hand's fit removes some itself."""
         found = self.choice.found
         return self._changes + (found.changes if isinstance(found, HandFit) else ())
 
     def left_by_changes(self) -> Vector | float:
-        """Return the covariance (p, p) of the estimate by what the parts do not show of the removed changes."""
+        """Return the covariance (p, p) of the estimate by the error that is left of the removed changes."""
         plain, found = self.choice.plain, self.choice.found
         if plain.parts is None:
             return 0.0
@@ -189,7 +199,7 @@ class _Fitted:
         return unseen_changes(self.changes, plain.parts, plain.D, rests_often)
 
     def find_sensitivity(self) -> Sensitivity | None:
-        """Return the gyroscope's sensitivity to acceleration that no rest shows; None if there is none, or a hand."""
+        """Return the gyroscope's sensitivity to acceleration, where no rests show it; None if none, or by a hand."""
         found, (flat, gravity, _) = self.choice.found, self._of
         if isinstance(found, HandFit) and found.noise.kind != "none":
             return None
@@ -200,11 +210,11 @@ class _Fitted:
         return self.choice.plain.V
 
     def find_change(self) -> Explanation | None:
-        """Return the change of the gyroscope's bias that explains what the fit leaves; None if the search failed."""
+        """Return the change of the gyroscope's bias that explains the residuals; None if none does, or no fit ended."""
         return gyroscope_change(self.explanations) if self.choice.plain.converged else None
 
     def without(self, change: Explanation) -> _Fitted:
-        """Fit the recording without one more change."""
+        """Remove one more change from the recording, and fit it again."""
         found = self.choice.found
         if isinstance(found, HandFit):
             choice = self.choice._replace(found=found.without(change))

@@ -25,9 +25,9 @@ from .uncertainty import Uncertainty, UncertaintyClaim, is_usable, propagate
 from .words import Decoded
 
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
-CLEARLY = 3.0  # ratio of misses above which another unit or range is the right one
+CLEARLY = 3.0  # ratio of misses above which another unit, range or matrix of axes is the right one
 BLOCK_S = 0.01
-# Ratios of the chip's ranges, by which rates are off that were read at another one; that of the same range first.
+# Factors of rates that were converted as of another range than the chip's; 1, the right range, is first.
 RANGE_RATIOS = sorted({a / b for a in GYRO_RANGES_DPS for b in GYRO_RANGES_DPS}, key=lambda ratio: abs(np.log(ratio)))
 
 T = TypeVar("T")
@@ -38,12 +38,13 @@ class Evidence:
     """Recording and its fit; flat and fit are None where the estimation did not get so far.
 
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
-    gyroscope : why the estimate uses the rests alone; None where it does not, or where that was asked for.
-    changed : what changed the sensor before or after the part of the recording that the estimate uses alone, or None.
-    first : sample of the whole recording with which this one begins.
-    decoded : the recording's words, before anything was masked, and how they were corrected.
-    against_rests : why it cannot use the rests alone, where nothing else was recorded.
-    walks : changes of the gyroscope's bias, which are removed from the rates for the fit.
+    gyroscope : the gyroscope's fault, because of which the estimate uses the rests alone; None where it uses the rates,
+        or where the user asked for the rests alone.
+    changed : None; or what changed the sensor, if the estimate uses only the part of the recording before or after it.
+    first : index of the first sample within the whole recording; above 0 for such a part.
+    decoded : the recording as read, before anything was masked, and how it was corrected.
+    against_rests : why the rests are not enough for an estimate, where no rates were recorded.
+    walks : changes of the gyroscope's bias, which were removed from the rates for the fit.
     """
 
     recording: Recording
@@ -68,18 +69,18 @@ class Evidence:
 
     @property
     def is_of_now(self) -> bool:
-        """True if the sensor did not change after what the estimate uses."""
+        """True if the estimate is of the sensor as it is now: it did not change after the part that is used."""
         return self.changed is None or self.first > 0
 
     @property
     def rest(self) -> Flat:
-        """Flat segment, where there is one."""
+        """Flat segment, for callers that know that there is one."""
         assert self.flat is not None
         return self.flat
 
     @property
     def estimate(self) -> Fit:
-        """Fit, where there is one."""
+        """Fit, for callers that know that there is one."""
         assert self.fit is not None
         return self.fit
 
@@ -127,8 +128,11 @@ class Evidence:
         return float(np.median(self.magnitude))
 
     @cached_property
-    def straying(self) -> tuple[float, float]:
-        """Medians, while the board turns, of the distance of |a| from g and of its bend within 10 ms [m/s^2]."""
+    def magnitude_errors(self) -> tuple[float, float]:
+        """Medians [m/s^2], while the board turns, of | |a| - g | and of the second difference of |a| - g over 10 ms.
+
+        A hand's own acceleration changes much within 10 ms; in smoothed readings it does not.
+        """
         r, a = self.recording, self.calibrated
         if a is None or self.flat is None:
             return 0.0, np.inf
@@ -145,7 +149,7 @@ class Evidence:
 
     @cached_property
     def gravity_carried(self) -> float:
-        """Largest angle [rad] between the flat mean and where the rates carry it, from half second to half second."""
+        """Largest angle [rad] between the flat mean and gravity as the rates carry it through the recording."""
         if self.flat is None or not np.isfinite(self.recording.gyr).all():
             return 0.0
         u = start = units(self.flat.y[None])
@@ -172,7 +176,7 @@ class Evidence:
 
     @cached_property
     def rates_in_degrees(self) -> bool:
-        """True if gravity turns from half second to half second as the rates say in deg/s, and not as in rad/s."""
+        """True if the turns of gravity within half seconds agree with rates in deg/s, and not in rad/s."""
         flat = self.flat
         if flat is None:
             segment = find_flat(replace(self.recording, gyr=np.deg2rad(self.recording.gyr)))
@@ -185,7 +189,7 @@ class Evidence:
         if not path > CLEARLY * angles.sum() > 0.0:  # turns about the vertical exceed it, too
             return False
         by, miss = _least_miss(turns, [np.eye(3), np.deg2rad(np.eye(3))])
-        # of a gravity that does not follow the board, no turn at all explains as much
+        # The rates must explain more than no turn at all does; they explain no gravity that does not follow the board.
         return bool(by[0, 0] < 1.0 and CLEARLY * miss < np.median(angles))
 
     def _turns_of_half_seconds(self, flat: Flat) -> _Turns:
@@ -206,7 +210,7 @@ class Evidence:
 
     @cached_property
     def _far_turns(self) -> list[int]:
-        """Places of the turns, from rest to rest, that move gravity far."""
+        """Indices of the turns, from rest to rest, that move gravity far."""
         u = units(statistics(self.recording.acc, self.rests)[0])
         found: list[int] = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_TURN_RAD).tolist()
         return found
@@ -217,12 +221,15 @@ class Evidence:
 
     @property
     def turned_unrecorded(self) -> bool:
-        """True if the board was turned between the parts of an interrupted recording alone."""
+        """True if the board was turned only while the recording was interrupted, between its parts."""
         return self.flat is not None and len(self._far_turns) > 0 and not len(self._turns_of_rests.runs)
 
     @cached_property
     def gyro_factor(self) -> float:
-        """Ratio of ranges with which rates explain how gravity turned from rest to rest, or of few, by half seconds."""
+        """Factor, of RANGE_RATIOS, by which the rates must be multiplied to explain how gravity turned; 1 if in doubt.
+
+        The turns are those from rest to rest; if these are too few, those of half seconds.
+        """
         if self.flat is None:
             return 1.0
         turns = self._turns_of_rests.measured
@@ -235,9 +242,11 @@ class Evidence:
 
     @cached_property
     def gyro_axes(self) -> Vector | None:
-        """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests.
+        """Matrix (3, 3) that corrects the rates of a gyroscope with wrong axes; None if their axes seem right.
 
-        It is None where it explains none, and where the rates explain all but few turns as they are.
+        It is a rotation by right angles, or -1. Multiplied by it, the rates explain how gravity turned between rests.
+        Only turns count that the rates do not explain as they are; a few of them, or a matrix that does not explain
+        them, are not enough.
         """
         turns, misses = self._turns_and_misses
         turns = turns.chosen(misses > MOST_MISS_RAD)
@@ -248,10 +257,11 @@ class Evidence:
         return by if miss < MOST_MISS_RAD else None
 
     @cached_property
-    def exchanged(self) -> tuple[float, float] | None:
-        """Times [s since the recording's start] between which axes were exchanged, or None.
+    def axes_exchanged_s(self) -> tuple[float, float] | None:
+        """Times [s since the recording's start] between which the gyroscope's axes changed to `gyro_axes`, or back.
 
-        Before or after, the rates explain how gravity turned as they are, and on the other side only with other axes.
+        On one side of that time the rates explain how gravity turned as they are, and on the other with those axes. It
+        is None where the axes did not change.
         """
         if self.gyro_axes is None:
             return None
@@ -259,7 +269,7 @@ class Evidence:
         others = _misses(turns, self.gyro_axes)
         as_they_are, exchanged = CLEARLY * misses < others, CLEARLY * others < misses
         if np.count_nonzero(as_they_are) < FEWEST_TRANSITIONS:
-            # so few may be by chance, but hardly at one end of a recording
+            # So few turns may be explained by chance, but hardly if all of them are at one end of the recording.
             known = as_they_are[as_they_are | exchanged]
             if np.count_nonzero(np.diff(known)) != 1 or misses[as_they_are].max() > CLEARLY * MOST_MISS_RAD:
                 return None
@@ -269,15 +279,15 @@ class Evidence:
 
     @cached_property
     def _turns_and_misses(self) -> tuple[_Turns, Vector]:
-        """Turns from rest to rest within the gyroscope's range, and by how much the rates miss gravity after each."""
+        """Turns from rest to rest within the gyroscope's range, and the misses (k,) [rad] of the rates, see _misses."""
         turns = self._turns_of_rests.measured
         return turns, _misses(turns, np.eye(3))
 
     @cached_property
     def gyro_miss(self) -> tuple[float, float]:
-        """Median angles [rad] from gravity as the rates carry it to gravity at the next rest; 0 of too few rests.
+        """Median misses [rad] of the turns within the gyroscope's range, and of all turns; 0 of too few turns.
 
-        The first is that of the turns within the gyroscope's range, the second that of all turns.
+        The miss of a turn is the angle from gravity as the rates carry it to gravity as measured in the next rest.
         """
         if self.flat is None:
             return 0.0, 0.0
@@ -295,13 +305,13 @@ class Evidence:
         return np.asarray(np.diff(r.t, prepend=r.t[0])[:, None] * (r.gyr - flat.b_omega))
 
     def _turns(self, flat: Flat, before: Vector, after: Vector, runs: Intervals) -> _Turns:
-        """Return the turns whose steps end with the samples of runs (k, 2)."""
+        """Return turns from gravity's directions `before` to `after` (k, 3), during the samples of runs (k, 2)."""
         first, last = np.append(0, np.cumsum(self.recording.gyr_clipped))[runs].T
         return _Turns(before, after, runs, last > first, self._steps(flat))
 
 
 def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
-    """Keep the value of a function of an Evidence with it, as cached_property does that of a method."""
+    """Cache the value of a function of an Evidence in that object, as cached_property does for a method."""
 
     @wraps(function)
     def kept(e: Evidence) -> T:
@@ -315,10 +325,11 @@ def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
 
 
 class _Turns(NamedTuple):
-    """Turns: gravity's directions before and after each (k, 3), and the samples (k, 2) that end its steps.
+    """Turns of gravity, and the gyroscope's steps from which they are predicted.
 
-    clipped : (k,) it went beyond the gyroscope's range, so that its rates say nothing about the gyroscope.
-    steps : (n, 3) rad, those of the whole recording.
+    before, after : (k, 3) gravity's directions before and after each turn. runs : (k, 2), first and last + 1 of the
+    samples with which its steps end. clipped : (k,) True if a rate was beyond the gyroscope's range, so that the turn
+    says nothing about the gyroscope. steps : (n, 3) rad, of the whole recording.
     """
 
     before: Vector
@@ -339,10 +350,13 @@ class _Turns(NamedTuple):
 
 
 def _least_miss(turns: _Turns, by: list[Vector]) -> tuple[Vector, float]:
-    """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
+    """Return that of the matrices `by` with which the rates miss least, and its median miss [rad].
+
+    The first matrix stays unless another one misses clearly less.
+    """
     first = _miss(turns, by[0])
-    # Each other matrix carries gravity to half of its turn or more from where the first one does, so that it cannot
-    # miss clearly less.
+    # The result of any other matrix differs from that of the first by half of the turn or more. So where the first one
+    # misses by little, no other can miss clearly less.
     if first + first / CLEARLY < 0.5 * np.median(_angles(turns.before, turns.after)):
         return by[0], first
     misses = [first, *(_miss(turns, M) for M in by[1:])]
@@ -352,7 +366,7 @@ def _least_miss(turns: _Turns, by: list[Vector]) -> tuple[Vector, float]:
 
 
 def _miss(turns: _Turns, by: Vector) -> float:
-    """Return the median angle [rad] by which the rates, multiplied by (3, 3), miss gravity after the turns."""
+    """Return the median of _misses [rad]."""
     return float(np.median(_misses(turns, by)))
 
 

@@ -1,8 +1,12 @@
-"""Estimator for a sensor in a hand: gyroscope's matrix, lever arm, the hand's own acceleration, jerks, drift.
+"""Estimator for a sensor in a hand: with the gyroscope's matrix, a lever arm, and the hand's own acceleration.
 
-The noise of the hand is found first, on means over blocks. White noise in motion comes first; a recording that needs
-none (a bench, or a hand that only jerks) ends there. Else the noise is coloured: with many rests, white with a
-correlation time; with few, the second derivative of a position that stays bounded.
+A rough search on means over blocks finds theta and the noise of the hand, that is, its own acceleration while it moves.
+It tries white noise first. If its most likely size is zero (a bench, or a hand that only jerks), there is no such
+noise. Else the noise is coloured. With many rests it is white noise with a correlation time. With few rests the board
+turns about a pivot, such as a wrist, and the noise is the second derivative of the pivot's bounded position.
+
+A fit of all samples begins where the search ended. After each of the two, changes of the gyroscope's bias are found
+and removed (bias_changes.py).
 """
 
 from __future__ import annotations
@@ -61,12 +65,12 @@ PASSES = 3
 
 @dataclass(frozen=True)
 class HandFit:
-    """Fit of a hand's model, whose honest covariance, a quarter of the work, is computed when it is asked for.
+    """Fit of a hand's model.
 
     Attributes
     ----------
-    fit : with the covariance by the model alone. minimum : where it ended. noise : of the hand as it moves.
-    search : by means over blocks, from which the fit began. fine : the recording sample by sample.
+    fit : with the covariance by the model alone; `honest` computes the other one. minimum : where it ended.
+    noise : of the hand as it moves. search : the rough search from which the fit began. fine : all samples.
     """
 
     fit: Fit
@@ -81,11 +85,14 @@ class HandFit:
         return self.search.changes
 
     def without(self, change: Explanation) -> HandFit:
-        """Fit the recording without one more change, from the beginning: with it, the fit may be far from the truth."""
-        return _fit(*self.search.left_by(change))
+        """Remove one more change from the recording, and fit it from the beginning.
+
+        The present fit is no start for that: the change may have led it far from the truth.
+        """
+        return _fit(*self.search.scales_without(change))
 
     def honest(self) -> Fit:
-        """Return the fit with its honest covariance."""
+        """Return the fit with its honest covariance, see _with_honest_information; it takes a quarter of the work."""
         minimum = _with_honest_information(self.minimum, self.noise, self.search.prepared, self.fine)
         covariance = minimum.covariance()
         known = undetermined(covariance) if minimum.free.all() else ()
@@ -95,14 +102,14 @@ class HandFit:
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
     """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
 
-    A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
-    perfect sensor.
+    A turn that the gyroscope missed can spoil the first estimate. A fit that does not converge begins once more, from
+    a perfect sensor.
     """
     return _fit(_Scales(recording, flat, gravity))
 
 
 def _fit(scales: _Scales, changes: tuple[Explanation, ...] = ()) -> HandFit:
-    """Fit a recording without some changes of the gyroscope's bias, as fit_hand does."""
+    """Fit a recording from which changes of the gyroscope's bias were removed, as fit_hand does."""
     begin = scales.rough.problem, scales.rough.flat.b_omega
     found = _fit_samples(without_changes(_Search(scales, initialise(*begin), changes)))
     if found.fit.converged:
@@ -112,7 +119,7 @@ def _fit(scales: _Scales, changes: tuple[Explanation, ...] = ()) -> HandFit:
 
 
 class _Scales:
-    """A recording on two time scales: means over blocks, for the rough search, and every sample, for the last fit."""
+    """Recording on two time scales: means over blocks for the rough search, and all samples for the last fit."""
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
         self.recording, self.flat, self.gravity = recording, flat, gravity
@@ -121,7 +128,7 @@ class _Scales:
 
     @cached_property
     def fine(self) -> Preprocessed:
-        """Every sample."""
+        """All samples."""
         at = self.flat.first, self.flat.last
         return prepare(self._without_drift, at, self._runs, self.gravity, self._noise_factor)
 
@@ -135,12 +142,12 @@ class _Scales:
 
 
 def _fit_samples(search: _Search) -> HandFit:
-    """Fit sample by sample, from where a search ended."""
+    """Fit all samples, from where a search ended."""
     fine, theta, noise = search.scales.fine, search.theta, search.noise
     if search.trembles:
         fine = remove_tremor(fine)
     fine = fine.with_rates_by(theta.K)
-    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
+    if noise.kind == "white":  # means over blocks hide jerks and some of the hand's noise, so its size is found again
         noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem, minimum = _settle(fine, noise, theta)
     iterations, vibration = search.iterations + minimum.iterations, vibration_sigma(fine, noise, minimum)
@@ -156,7 +163,8 @@ def _fit_samples(search: _Search) -> HandFit:
     transitions = transitions_of(fine, minimum.theta)
     spoilt = (fine.recording.gap | fine.recording.gyr_clipped)[fine.flat.last :]
     slip, slipped = find_slip(transitions, fine, minimum.theta, spoilt)
-    # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
+    # A slip may be a different change in truth. So the misses after the slip give the noise, by which the parts' scores
+    # are weighted; then all hypotheses can explain what looks like a slip.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
     return HandFit(replace(fit, slip=slip, slipped=slipped), minimum, noise, search, fine)
@@ -169,11 +177,11 @@ def _settle(fine: Preprocessed, noise: Noise, theta: Theta) -> tuple[Problem, Mi
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
-    """Return the minimum with an honest H.
+    """Return the minimum with an honest H, the Fisher information by a noise that is not too small.
 
-    After the fit the transitions miss by less than the gyroscope's error, since few transitions and many parameters
-    leave few degrees of freedom. Their noise is estimated again, with the degrees of freedom that are left; the
-    estimate itself would not improve.
+    After the fit the transitions between rests miss by less than the gyroscope's error, since few transitions and many
+    parameters leave few degrees of freedom. So the noise of the transitions is estimated again, divided by the degrees
+    of freedom that are left. The estimate stays, since it would not improve.
     """
     if noise.kind == "none":
         return minimum
@@ -197,7 +205,7 @@ def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed
 
 
 def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
-    """Return the problem with the gyroscope's noise between rests that the rests show, under theta."""
+    """Return the problem with the noise of the gyroscope between rests that explains the transitions under theta."""
     transitions = transitions_of(prepared, theta)
     if not transitions:
         return problem
@@ -207,9 +215,9 @@ def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Thet
 def _with_each_variance(
     problem: Problem, minimum: Minimum, transitions: Sequence[Transition]
 ) -> tuple[Problem, Minimum]:
-    """Return the problem in which each transition has a variance of its own, and the minimum as seen in it.
+    """Return the problem in which each transition has a variance of its own, and the minimum evaluated in it.
 
-    The estimate stays: with so few transitions it would follow some and leave out others.
+    The estimate stays: with so few transitions it would follow some and ignore others.
     """
     ends = ends_of(problem)
     if not transitions or ends is None:
@@ -232,12 +240,13 @@ def _scaled(problem: Problem, factor: Vector) -> Problem:
 
 
 class _Search:
-    """Search for theta and the hand's noise in turn, by rough fits.
+    """Rough search, on means over blocks, for theta and the hand's noise in turn.
 
     Attributes
     ----------
     theta, noise : where it ended. changes : of the gyroscope's bias, removed before.
-    prepared : the means over blocks; if it `trembles`, the tremor has a lever arm of its own, and is removed from them.
+    trembles : True if the hand's tremor turns the board about a lever arm of its own. prepared : the means over blocks,
+        without the tremor if it `trembles`.
     """
 
     def __init__(self, scales: _Scales, begin: Theta, changes: tuple[Explanation, ...] = ()) -> None:
@@ -256,9 +265,9 @@ class _Search:
         return self._last[1].V
 
     def find_change(self) -> Explanation | None:
-        """Return the change of the gyroscope's bias that explains what the search leaves, or None.
+        """Return the change of the gyroscope's bias that explains the residuals of the search, or None.
 
-        None too where the search failed, and where the gyroscope's noise explains the transitions between rests.
+        None is also returned where the search failed, or the gyroscope's noise explains the transitions between rests.
         """
         transitions = transitions_of(self.prepared, self.theta)
         if not self._last[1].converged or are_explained(transitions):
@@ -267,18 +276,18 @@ class _Search:
         return gyroscope_change(rank(parts_of(*weighed, self._prior), self.theta.D, CHANGES))
 
     def without(self, change: Explanation) -> _Search:
-        """Search once more, from where this one ended, in the recording without one more change."""
-        scales, changes = self.left_by(change)
+        """Remove one more change from the recording, and search again from where this search ended."""
+        scales, changes = self.scales_without(change)
         return _Search(scales, self.theta, changes)
 
-    def left_by(self, change: Explanation) -> tuple[_Scales, tuple[Explanation, ...]]:
-        """Return the recording without one more change, and all changes that it is without."""
+    def scales_without(self, change: Explanation) -> tuple[_Scales, tuple[Explanation, ...]]:
+        """Remove one more change from the recording; return it, and all changes that were removed."""
         scales = self.scales
         recording = remove_change(scales.recording, scales.flat, change)
         return _Scales(recording, scales.flat, scales.gravity), (*self.changes, change)
 
     def _run(self, theta: Theta) -> tuple[Theta, Noise]:
-        """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
+        """Search with Huber's loss, which converges from afar, then with the redescending loss and the best sigma."""
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigmas = HAND_MPS2 if prepared.rests_often else WHITE_MPS2
@@ -291,7 +300,7 @@ class _Search:
             return theta, Noise("none", 0.0)
         noise = Noise("white", sigma)
         if not prepared.rests_often:
-            theta, noise = self._pivoting(theta)
+            theta, noise = self._fit_pivot(theta)
         for _ in range(PASSES):
             problem = _with_transition_noise(noise.problem(self.prepared), self.prepared, theta)
             before, theta = theta, self._roughly(problem, theta)
@@ -299,18 +308,21 @@ class _Search:
                 break
         return theta, noise
 
-    def _pivoting(self, theta: Theta) -> tuple[Theta, Noise]:
-        """Fit a pivot's travel, and a lever arm of the tremor where the BIC of its three components wants one."""
-        theta, noise = self._travel(theta)
+    def _fit_pivot(self, theta: Theta) -> tuple[Theta, Noise]:
+        """Fit a pivot's travel, and a lever arm of the tremor if that lowers the BIC despite three parameters more.
+
+        This decides `trembles`, and sets `prepared`.
+        """
+        theta, noise = self._fit_travel(theta)
         one, theta = self.prepared, self._roughly(noise.problem(self.prepared), theta)
         two = remove_tremor(one)
         there = self._roughly(noise.problem(two), theta)
         if _least_cost(two, there) + 1.5 * math.log(len(two.problem.series)) > _least_cost(one, theta):
             return theta, noise
         self.prepared, self.trembles = two, True
-        return self._travel(there)
+        return self._fit_travel(there)
 
-    def _travel(self, theta: Theta) -> tuple[Theta, Noise]:
+    def _fit_travel(self, theta: Theta) -> tuple[Theta, Noise]:
         """Fit theta and the most likely size of a pivot's travel."""
         pivot = self.prepared.pivot
         sigma = most_likely_sigma(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
@@ -318,6 +330,7 @@ class _Search:
         return theta, Noise("pivot", FARTHER * most_likely_sigma(pivot, PIVOT_MPS2, theta, sigma))
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
+        """Fit roughly; keep the problem and its minimum as the last ones, and count the iterations."""
         minimum = _roughly(problem, theta, self._prior)
         self.iterations += minimum.iterations
         self._last = problem, minimum
@@ -329,5 +342,5 @@ def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...
 
 
 def _least_cost(prepared: Preprocessed, theta: Theta) -> float:
-    """Return V at theta with the most likely size of a pivot's travel."""
+    """Return V at theta, with the size of a pivot's travel for which it is least."""
     return value(prepared.pivot(most_likely_sigma(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])), theta)

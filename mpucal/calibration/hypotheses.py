@@ -1,24 +1,26 @@
 """Hypotheses about what happened while the board was turned, each weighed by its evidence.
 
-Under a hypothesis, a quantity has three numbers delta_k beside theta in each group of the recording's parts: the
-accelerometer's bias, its scale factors, its mount, or the gyroscope's bias. A group is a stretch of time. They are made
-of x ~ N(0, q):
+The null hypothesis is that nothing happened: theta is constant. Each other hypothesis says that one quantity changed:
+the accelerometer's bias, its scale factors, its mount (its rotation relative to the gyroscope), its linearity, or the
+gyroscope's bias. The parts of the recording (parts.py) are joined to groups, which are intervals of time. In group k
+the quantity differs by delta_k (3 numbers, one for each axis) from theta. The shape of a hypothesis says how delta_k
+follows from numbers x ~ N(0, q):
 
-    step    one x, from some time on, or growing evenly
-    walk    an x for each stretch, and delta_k is the sum of those so far
-    pulse   one x, in one stretch: a knock, or the board taken up and put down
-    each    an x for each group: an effect that no model has, such as a pivot that swings
-    reading two x, by which the error of each axis grows with the square and the cube of its reading
+    step    one x: delta_k is x from some time on, or grows evenly to x
+    walk    one x in each group: delta_k is their sum so far
+    pulse   one x: delta_k is x for a short time, as by a knock, or by a board that is taken up and put down
+    each    one x in each group: delta_k is x_k, for an effect that no model has, such as a pivot that swings
+    reading two x: delta_k grows with the square and the cube of each axis' reading
 
-To second order the parts' scores are enough. With theta eliminated the quadratic form of x is S + I/q, and by the
-eigenvalues of S and the components c of the scores
+Log likelihoods are expanded to second order, for which the parts' scores are enough. With theta eliminated, the
+quadratic form of x is S + I/q. With the eigenvalues lambda of S and the scores' components c along its eigenvectors,
 
     2 log p(q)/p(0) = sum c^2 / (lambda + 1/q) - log(1 + q lambda)
 
-The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step. All hypotheses together are
-beforehand as likely as nothing, and all are weighed against each other: what one common cause explains needs no other.
-But there are two sensors. What surely happened to the gyroscope is taken out of the scores, and the others are weighed
-once more by what is left: a warming chip moves the biases of both.
+The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step or pulse. The null hypothesis
+has half of the prior probability, and all others share the other half. They compete, so that one common cause is not
+found under several names. But one cause may act on both sensors, as warming does on both biases. So a change of the
+gyroscope that is certain is first taken out of the scores, and the other hypotheses are weighed again by what is left.
 
 Source: Kass, Raftery, "Bayes factors" (1995); of random effects, Robinson, "That BLUP is a good thing" (1991).
 """
@@ -40,12 +42,15 @@ from .rotation import cross
 
 What = Literal["accelerometer", "scale", "mount", "gyroscope", "linearity"]
 Kind = Literal["change", "time", "side"]
-# stretches of time by shape: a change is looked for in each, and the others have numbers in each
+# Number of groups by shape. A step or pulse is tried at each group; a walk and `each` have an x in each.
 GROUPS = {"step": 48, "walk": 16, "pulse": 48, "each": 16, "reading": 96}
 
 
 class Hypothesis(NamedTuple):
-    """Hypothesis: the quantity, how it is distributed, and how often."""
+    """Hypothesis that the quantity `what` changed in the course of time as `shape` says.
+
+    prior : how often it happens, relative to the other hypotheses.
+    """
 
     what: What
     shape: Literal["step", "walk", "pulse", "each", "reading"]
@@ -53,20 +58,20 @@ class Hypothesis(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """True if the sensor is another one afterwards."""
+        """True if the change remains afterwards."""
         return self.shape in ("step", "walk")
 
     @property
     def kind(self) -> Kind:
-        """Kind of the hypothesis, for messages: a change is one of the accelerometer."""
+        """Kind of message about it: by a change of the accelerometer, by time, or by the side that is down."""
         if self.shape == "reading":
             return "side"
         return "change" if self.is_change and self.what != "gyroscope" else "time"
 
 
-# Every gyroscope's bias walks, and few step or drift steadily.
+# Prior of a step, as every gyroscope's bias walks, and few step or drift steadily.
 RARELY = 0.1
-# Those of one shape are beside each other, and computed together.
+# Hypotheses of one shape must be neighbours here: they are computed together.
 HYPOTHESES = (
     Hypothesis("accelerometer", "step"),
     Hypothesis("scale", "step"),
@@ -81,17 +86,17 @@ HYPOTHESES = (
     Hypothesis("linearity", "reading"),
 )
 CHANGES = tuple(each for each in HYPOTHESES if each.is_change)
-# Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
+# Largest standard deviation of x that is tried, in m/s^2, 1, rad, rad/s and m/s^2; the smallest is a 10,000th of it.
 LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03, "linearity": 0.1}
-# m/s^2 at 1 g, of the square and the cube: a tenth of what a data sheet allows (0.5 %)
+# Standard deviation [m/s^2 at 1 g] of the square's and the cube's x: a tenth of what a data sheet allows (0.5 %).
 NONLINEARITY_MPS2 = 0.005
 VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
-# Odds above which something is said to have happened, against nothing and against what else it may be.
+# A conclusion needs these odds: that something happened, against the null hypothesis, and what it was, against others.
 SURE = 100.0
-# The true cause need not be in the table, and then odds between wrong ones mean little: those whose evidence is, in
-# logs, more than this share of the likeliest one's may be like it.
+# The true cause may be missing in HYPOTHESES, and then the odds between others mean little. So a hypothesis is still
+# possible whose log evidence is more than this share of the likeliest one's.
 LEAST_EVIDENCE = 0.7
-# Share of the largest eigenvalue, below which a direction of x is left out: the parts say next to nothing of it.
+# Share of the largest eigenvalue below which a direction of x is left out: the parts hardly determine it.
 UNSEEN = 3e-4
 PULSES = (1, 2, 3)  # groups that a pulse lasts
 
@@ -101,15 +106,17 @@ class Explanation(NamedTuple):
 
     Attributes
     ----------
-    hypothesis : which one. evidence : log of its evidence as a multiple of that of nothing.
+    hypothesis : which one. evidence : log of its evidence, relative to that of the null hypothesis.
     delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
     start, end : (k,) s after the flat segment, of the groups.
-    aways : (m, p) rms distances of the estimate from the parameters, if it is true; of a change, by group.
-    shift : (1 + k, p) parameters less the estimate, before the first group and in each, at the likeliest q and time.
-    likeliest : index of the likeliest shape. q : likeliest variance of x.
-    weight : probability among all hypotheses and nothing.
-    is_sure : True for a change of the accelerometer against which all else is unlikely.
-    is_possible : True if something surely happened, and this explains it, or nearly as much of it as the likeliest one.
+    aways : (m, p) rms errors of the estimated parameters if the hypothesis is true; m is the number of groups for a
+        change, after which the true parameters differ, and else 1.
+    shift : (1 + k, p) true parameters minus the estimate, in the flat segment and in each group, at the likeliest q and
+        time.
+    likeliest : index of the likeliest time, see _shapes. q : likeliest variance of x.
+    weight : posterior probability.
+    is_sure : True for the likeliest change of the accelerometer, where it is certain that there was one.
+    is_possible : True if it is certain that something happened, and this hypothesis is about as good as the likeliest.
     """
 
     hypothesis: Hypothesis
@@ -127,7 +134,7 @@ class Explanation(NamedTuple):
 
     @property
     def log_share(self) -> float:
-        """Log of its probability as a multiple of that of nothing; beforehand nothing is as likely as all together."""
+        """Log of its posterior probability, relative to that of the null hypothesis."""
         return self.evidence + float(np.log(self.hypothesis.prior / sum(each.prior for each in HYPOTHESES)))
 
     @property
@@ -137,18 +144,18 @@ class Explanation(NamedTuple):
 
     @property
     def away(self) -> Vector:
-        """Distances (p,) of the estimate from the parameters: rms over time, of a likely change the largest."""
+        """Errors (p,) of the estimated parameters: the largest of all groups for a likely change, else the rms."""
         is_likely = self.is_possible and self.hypothesis.kind == "change" and self.weight > 0.5
         return np.asarray(self.aways.max(axis=0) if is_likely else np.sqrt(np.mean(self.aways**2, axis=0)))
 
     @property
     def span(self) -> tuple[float, float]:
-        """Times [s after the flat segment] of its largest steps from group to group, or of the group farthest off."""
+        """Times [s after the flat segment] between which most of the change happened, or the largest delta_k was."""
         if not self.hypothesis.is_change:
             at = int(np.linalg.norm(self.delta, axis=1).argmax())
             return float(self.start[at]), float(self.end[at])
         steps = np.linalg.norm(np.diff(self.delta, axis=0), axis=1)
-        large = np.flatnonzero(steps > 0.5 * steps.max())  # of a steady drift all are
+        large = np.flatnonzero(steps > 0.5 * steps.max())  # all steps of a steady drift, so that its span is the whole
         return float(self.middles[large[0]]), float(self.middles[large[-1] + 1])
 
     @property
@@ -158,17 +165,14 @@ class Explanation(NamedTuple):
 
 
 def rank(parts: Parts | None, D: Vector, hypotheses: Sequence[Hypothesis] = HYPOTHESES) -> list[Explanation]:
-    """Return what each hypothesis says, weighed against the others and nothing, the likeliest first.
-
-    Nothing where the fit failed, or has no parts.
-    """
+    """Return an explanation by each hypothesis, the likeliest first; none where the fit failed or has no parts."""
     if parts is None or not (parts.is_finite and np.isfinite(D).all()):
         return []
     return _weigh(hypotheses, parts, D)
 
 
 def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Explanation]:
-    """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
+    """Return the certain changes of the gyroscope, then explanations of what these leave, the likeliest first.
 
     found : what `rank` returned.
     """
@@ -181,14 +185,14 @@ def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Ex
 
 
 def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Explanation]:
-    """Return what each hypothesis says, weighed against the others and nothing, the likeliest first."""
+    """Return an explanation by each hypothesis with its posterior probability, the likeliest first."""
     groups = {number: _Groups.of(parts, number) for number in {GROUPS[each.shape] for each in hypotheses}}
     found = [
         each
         for shape, alike in groupby(hypotheses, key=lambda each: each.shape)
         for each in _explain(list(alike), groups[GROUPS[shape]], parts, D)
     ]
-    total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
+    total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # 0: the null hypothesis
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.weight)
     if total > np.log(SURE):
@@ -203,17 +207,17 @@ def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Ex
 
 
 def _without(parts: Parts, known: Explanation) -> Parts:
-    """Return the parts with their scores at the parameters that an explanation gives each of them."""
+    """Return the parts with scores at the parameters that hold in each part if an explanation is true."""
     shift = known.shift[1 + parts.by_time(GROUPS[known.hypothesis.shape])]
     moved = np.einsum("kpq,kq->kp", parts.fisher, shift)
-    besides = parts.H - parts.fisher.sum(axis=0)  # of the prior and the flat mean
+    besides = parts.H - parts.fisher.sum(axis=0)  # Fisher matrix of the prior and the flat mean
     return replace(
         parts, gradient=parts.gradient + moved, left=parts.left + moved.sum(axis=0) + besides @ known.shift[0]
     )
 
 
 def gyroscope_change(explanations: Sequence[Explanation]) -> Explanation | None:
-    """Return the change of the gyroscope's bias; None where nothing, or a change of the accelerometer, is likelier."""
+    """Return the change of the gyroscope's bias; None where no change, or one of the accelerometer, is likelier."""
     first = next((each for each in explanations if each.hypothesis.is_change), None)
     is_likely = first is not None and first.hypothesis.what == "gyroscope" and first.log_share > np.log(SURE)
     return first if is_likely else None
@@ -222,7 +226,7 @@ def gyroscope_change(explanations: Sequence[Explanation]) -> Explanation | None:
 def remove_change(recording: Recording, flat: Flat, change: Explanation) -> Recording:
     """Subtract a change of the gyroscope's bias from the rates after the flat segment.
 
-    It is interpolated linearly between the middles of the groups. The flat mean is the bias in that segment's middle.
+    It is interpolated linearly between the middles of the groups, and begins with 0 in the middle of the flat segment.
     """
     t = recording.t - recording.t[flat.last - 1]
     at, delta = np.append(0.5 * t[flat.first], change.middles), np.vstack([np.zeros(3), change.delta])
@@ -251,12 +255,15 @@ class _Groups(NamedTuple):
 
 
 class _Likelihood(NamedTuple):
-    """Log likelihood of x without theta, in m shapes of d numbers each, along the eigenvectors of its quadratic form.
+    """Quadratic log likelihood of x with theta eliminated, along the eigenvectors of its quadratic form.
+
+    It is computed for h hypotheses, and for the m times that their shape can have. x has r numbers for each axis, and
+    d = 3 r components along the eigenvectors.
 
     Attributes
     ----------
-    eigenvalues, scores : (h, m, d) of h hypotheses. strays : (h, m, d, p), by which the estimate strays from theta.
-    U : (h, m, r, 3, d) eigenvectors, of r numbers of each axis.
+    eigenvalues, scores : (h, m, d). strays : (h, m, d, p), error of the estimated parameters by a unit of a component.
+    U : (h, m, r, 3, d) eigenvectors.
     """
 
     eigenvalues: Vector
@@ -268,9 +275,9 @@ class _Likelihood(NamedTuple):
     def of(cls, B: Vector, shapes: Vector, groups: _Groups, parts: Parts) -> _Likelihood:
         """Eliminate theta from the parts' scores.
 
-        B : (h, p, 3) derivatives of the parameters. shapes : (m, 1 + k, r, 1 or 3), see _shapes.
+        B : (h, p, 3) see _directions. shapes : (m, 1 + k, r, 1 or 3), see _shapes.
         """
-        # The flat segment is in no group: its parameters are eliminated, and the groups' are relative to them.
+        # The flat segment is in no group. The parameters that are eliminated are those that hold in it.
         flat, shapes = shapes[:, 0], shapes[:, 1:] - shapes[:, :1]
         (h, p, _), (m, k, r, axes) = B.shape, shapes.shape
         weights = shapes.transpose(3, 0, 2, 1).reshape(axes, m * r, k)
@@ -289,14 +296,14 @@ class _Likelihood(NamedTuple):
         return cls(np.maximum(eigenvalues, 0.0), scores, U.swapaxes(2, 3) @ follow, U.reshape(h, m, r, 3, -1))
 
     def seen(self) -> _Likelihood:
-        """Return it without the directions of x of which the parts say next to nothing."""
+        """Return it without the directions of x that the parts hardly determine."""
         eigenvalues, scores, strays, U = self
         is_seen = eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True)
         return _Likelihood(eigenvalues, scores * is_seen, strays * is_seen[..., None], U * is_seen[:, :, None, None])
 
 
 def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector) -> list[Explanation]:
-    """Return what hypotheses of one shape say."""
+    """Return explanations by hypotheses of one shape, in their order."""
     B = np.array([_directions(each.what, D, len(parts.H)) for each in alike])
     shapes = _shapes(alike[0].shape, groups)
     likelihood = _Likelihood.of(B, shapes, groups, parts).seen()
@@ -313,8 +320,9 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     weighed = p[..., None] * x
     squares = weighed.swapaxes(2, 3) @ x
     np.einsum("hmdd->hmd", squares)[:] += np.einsum("hmq,hmqd->hmd", p, variance)
-    # The estimate strays by x times a basis (h, m, a, d, p), and less by what the shapes weigh in a group where the
-    # sensor is another one. Its mean products need no array of every shape in every group.
+    # The mean square error of the estimated parameters is needed in each group. An error is x times a sum over a of
+    # basis (h, m, a, d, p) and weights (m, groups, a). For a change it has two terms, as the true parameters in a group
+    # differ by delta_k. The products of the terms are averaged first, which needs no array of (h, m, groups, d, p).
     basis, weights = -likelihood.strays[:, :, None], np.ones((len(shapes), 1, 1))
     if alike[0].is_change:
         of_x = likelihood.U.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
@@ -337,16 +345,17 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
 
 
 def nonlinearity(parts: Parts, D: Vector) -> Vector:
-    """Return the covariance (p, p) of the estimate by a nonlinearity of NONLINEARITY_MPS2, as far as it is not seen."""
+    """Return the covariance (p, p) of the estimate by a nonlinearity of NONLINEARITY_MPS2 that the parts may hide."""
     groups = _Groups.of(parts, GROUPS["reading"])
     return _unseen("linearity", NONLINEARITY_MPS2**2, _shapes("reading", groups), groups, parts, D)
 
 
 def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector, rests_often: bool) -> Vector:
-    """Return the covariance (p, p) of the estimate by what the parts do not show of changes that were removed.
+    """Return the covariance (p, p) of the estimate by the error that is left of changes that were removed.
 
-    That may be as large as the largest change. Between rests, a walk has an x in each group. Where a machine turns
-    evenly, a walk within a group passes for another mount, and it has an x in each part.
+    Each hypothesis counts once, with its largest change. A walk has one x in each group, if the board rests often. A
+    machine that turns evenly does not rest, and there a walk within a group looks like an error of the mount: so it has
+    one x in each part.
     """
     total = np.zeros_like(parts.H)
     largest = {each.hypothesis: each for each in sorted(changes, key=lambda each: each.q)}
@@ -359,7 +368,7 @@ def unseen_changes(changes: Sequence[Explanation], parts: Parts, D: Vector, rest
 
 
 def _unseen(what: What, q: float, shapes: Vector, groups: _Groups, parts: Parts, D: Vector) -> Vector:
-    """Return the covariance (p, p) of the estimate by x of variance q in each shape, as far as the parts leave it."""
+    """Return the covariance (p, p) of the estimate by x of variance q, given the parts, summed over the shapes."""
     if not parts.is_finite:
         return np.full_like(parts.H, np.nan)
     likelihood = _Likelihood.of(_directions(what, D, len(parts.H))[None], shapes, groups, parts)
@@ -369,7 +378,7 @@ def _unseen(what: What, q: float, shapes: Vector, groups: _Groups, parts: Parts,
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:
-    """Return (p, 3), the derivatives of the parameters by the three numbers."""
+    """Return (p, 3), the derivatives of the parameters by delta_k."""
     B = np.zeros((p, 3))
     if what == "mount":
         B[PLACES["D"]] = (D @ cross(np.eye(3))).reshape(3, 9).T
@@ -381,14 +390,15 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
 
 
 def _shapes(shape: str, groups: _Groups) -> Vector:
-    """Return (m, 1 + k, r, 1 or 3) weights of r numbers in the flat segment and in k groups, by axis where they differ.
+    """Return (m, 1 + k, r, 1 or 3) weights, with which x makes delta_k in the flat segment and in k groups.
 
-    Of steps and pulses there are m, with one number each.
+    m : times at which a step or pulse may happen, else 1. r : numbers x of each axis. The last dimension is 3 where the
+    weights of the axes differ.
     """
     k = len(groups.start)
     if shape == "reading":
         u = groups.reading / STANDARD_GRAVITY_MPS2
-        # Over all directions, these have no linear part: theta is the best linear sensor.
+        # Averaged over all directions, these have no linear part, which theta has already.
         return np.stack([u**2 - 1.0 / 3.0, u**3 - 0.6 * u], axis=1)[None]
     at = np.arange(k + 1)
     if shape == "step":

@@ -1,4 +1,4 @@
-"""Samples that must not be believed as they are: spikes, clipped ones, and steps across a gap, interpolated or not."""
+"""Samples that are marked or replaced, since they are not measurements: spikes, clipped ones, and steps across gaps."""
 
 from __future__ import annotations
 
@@ -20,29 +20,31 @@ from .words import ODDS
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
 RANGE_TOLERANCE = 2e-3
-# Fewer samples in a row that repeat, or follow a line, do so by chance.
+# Fewer samples in a row that are equal, or on a straight line, may be so by chance.
 SHORTEST_RUN = 8
 
 CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a long gap is unknown
-BRIDGED_S = 0.25  # the longest gap across which a hand's rate is interpolated, and how far beside it this is tried
-CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer run hides more of what lies beyond the range
+BRIDGED_S = 0.25  # longest gap across which a hand's rate is interpolated; its error is tried out so far on both sides
+CLIPPED_RATE_SD = 0.0015  # share of |omega|, of one clipped sample; in a longer run the rate goes farther beyond
 
-# After a long gap a linear correction falls short of the turn: the samples that follow correct it again.
+# After a gap with a larger uncertainty of the turn, the filter's linear correction falls short of the turn: so many
+# samples more are allowed to correct it.
 LOST_RAD, SETTLING = 0.2, 5
 
 LINE_TOLERANCE = 1e-6
 
-# A board is reset if gravity turns far within a step, unseen by the gyroscope, and not in the neighbouring steps; it is
-# then as near to the flat segment's as BACK, a share of it.
+# A simulated board was reset if gravity turns far within a step, without a rate, and in none of the NEIGHBOURS steps on
+# both sides; gravity is then that of the flat segment, up to the share BACK.
 NEIGHBOURS, BACK = 4, 0.02
 
 
 def _without_spikes(recording: Recording) -> Vector:
-    """Return the rates, each spike of a single word that is back with the next sample replaced by its neighbours' mean.
+    """Return the rates without spikes: each is replaced by the mean of the samples before and after it.
 
-    Whatever spoils a word of a file leaves a spike; no board moves like that. A chip's decoder repairs its own
-    (chip/bit_flips.py). A spike of the acceleration stays: it may be a knock, which the fit weighs itself.
+    A spike is one wrong reading of one axis. A damaged word of a file leaves one; no board moves like that. The chip's
+    own spikes are repaired before, by its decoder (chip/bit_flips.py). A spike of the acceleration stays: it may be a
+    knock, to which the fit gives less weight.
     """
     gyr = recording.gyr
     at, axis = _kernel.spikes(np.ascontiguousarray(recording.acc), np.ascontiguousarray(gyr)).astype(np.intp).T
@@ -60,8 +62,8 @@ def with_masks(recording: Recording) -> Recording:
     """
     recording = _without_zeros(recording)
     dt = np.diff(recording.t, prepend=recording.t[0])
-    # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
-    # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
+    # An autopilot's stream loses single packets, and its source marks longer pauses itself. Its values are rounded, and
+    # repeat without being clipped: no hand reaches the end of their range.
     of_a_chip = recording.sensor.origin is not Origin.VEHICLE
     paused = of_a_chip & (dt > GAP_INTERVALS / recording.rate_hz)
     # A chip whose range is known does not clip at another one.
@@ -78,16 +80,16 @@ def with_masks(recording: Recording) -> Recording:
         marked.gap[run.first : run.last] = True
     for axis, first, last in stuck_readings(marked, "acc"):
         column, value = recording.acc[:, axis], recording.acc[first, axis]
-        # the end of a range that is not known is reached more than once
+        # An axis that repeats its largest or smallest value, and reaches it at another time too, is clipped.
         if value in (column.min(), column.max()) and np.count_nonzero(column == value) > last - first:
             marked.acc_clipped[first - 1 : last - 1] = True
     return replace(marked, gyr=_without_spikes(recording))
 
 
 def _without_zeros(recording: Recording) -> Recording:
-    """Return the recording with samples that were not read marked as gaps: all of their readings are zero.
+    """Return the recording with gaps where a sample was not read, so that all of its readings are zero.
 
-    Between others they are interpolated. Rates of zero before all others are those of a gyroscope that began later.
+    Such a sample is interpolated. Also the samples before a gyroscope began, whose rates are zero, are gaps.
     """
     moves = lengths(recording.gyr) != 0.0
     read = moves | (lengths(recording.acc) != 0.0)
@@ -106,8 +108,8 @@ def _without_zeros(recording: Recording) -> Recording:
 def _late_rates(recording: Recording, moves: Mask, read: Mask) -> int:
     """Return the number of samples before a gyroscope began, while the board rested; 0 if it was there from the start.
 
-    The rates of a board that was simulated without noise are zero in each of its rests. Then it begins to turn: gravity
-    moves, or the rates grow from one sample to the next.
+    A board that was simulated without noise has rates of zero, too, in each rest. But its rates are zero until it
+    begins to turn: then gravity moves, or the first rates are small.
     """
     begins = int(moves.argmax())
     if begins == 0 or (read & ~moves)[begins:].any() or not np.ptp(recording.acc[:begins], axis=0).any():
@@ -120,9 +122,9 @@ def _late_rates(recording: Recording, moves: Mask, read: Mask) -> int:
 
 
 def find_reset(recording: Recording, flat: Flat) -> int | None:
-    """Return the first sample after a simulator was reset, None where it was not.
+    """Return the first sample after a simulator was reset: the board lies flat again within one step, without a rate.
 
-    The board lies flat again within one step, and no rate shows the way.
+    None is returned where it was not.
     """
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt = np.diff(recording.t[flat.last :])[:, None]
@@ -149,22 +151,23 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
     rates, variance = _bridged(recording)
     q_extra = variance[last:].copy()
-    # The measured rates on both sides of a long gap do not tell the rate within it.
+    # Nothing is known of the rate in a long gap: it counts as zero.
     omega = np.where(gap[:, None], np.where(np.isnan(rates[last:]), flat.b_omega, rates[last:]), series.omega)
     up = units(recording.acc[last - 1 :])
     for i in np.flatnonzero(q_extra > LOST_RAD**2):
         q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
-        if up[i].any() and up[i + 1].any():  # a linear correction of a turn to the other side leads astray
+        if up[i].any() and up[i + 1].any():  # gravity shows the turn, for which a linear correction may be too large
             omega[i] = flat.b_omega - shortest_turn(up[i], up[i + 1]) / series.dt[i]
     q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
 
 
 def _bridged(recording: Recording) -> tuple[Vector, Vector]:
-    """Return mean rates (n, 3) and the variance (n,) [rad^2 an axis] of the turn of each step that is in a gap.
+    """Return mean rates (n, 3), and the variance (n,) [rad^2 an axis] of the turn, of each step in a gap.
 
-    Across a short gap the rates are interpolated. The turn then errs by as much as interpolation errs at most over
-    parts of the same length beside the gap. A longer gap has no rate, NaN; other steps have neither.
+    Across a short gap the rates are interpolated. The error of that is the largest one that interpolation makes over
+    intervals of the same length beside the gap, where the rates are known. The rates in a longer gap are NaN. A step in
+    no gap has NaN and 0.
     """
     t, gyr, gap = recording.t, recording.gyr, recording.gap
     dt, reach = np.diff(t, prepend=t[0]), round(BRIDGED_S * recording.rate_hz)
@@ -197,14 +200,14 @@ def _run_lengths(mask: Mask) -> Vector:
 
 
 def _on_a_line(values: Vector, t: Vector) -> Mask:
-    """Return (n,) True within straight lines that all axes follow exactly, and not at rest: those are interpolated."""
+    """Return (n,) True for samples that were interpolated: while the board turns, all axes follow straight lines."""
     dt, straight = np.diff(t), np.ones(max(len(t) - 2, 0), bool)
     turns = ~straight
     for column in values.T:
         slope = np.diff(column) / dt
         steep = np.abs(slope[1:])
         straight &= np.abs(np.diff(slope)) <= LINE_TOLERANCE * steep
-        if not straight.any():  # nearly every recording ends here, and the other axes need no look
+        if not straight.any():  # the case of nearly every recording, which saves the time for the other axes
             return np.zeros(len(values), bool)
         turns |= steep > 0
     if 2 * np.count_nonzero(straight) > len(straight):  # the data are computed, and have no noise anywhere
@@ -225,22 +228,23 @@ class Stuck(NamedTuple):
 
 
 def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[Stuck]:
-    """Find readings within the range that repeat while the board turns, longer than their noise lets them."""
+    """Find readings that repeat while the board turns, for longer than by chance, though they are within the range."""
     if recording.sensor.origin is Origin.VEHICLE:
         return []  # its stream is rounded, and repeats
     values, clipped, stuck = getattr(recording, sensor), getattr(recording, f"{sensor}_clipped"), []
     swings = LEAST_TURN_RAD * STANDARD_GRAVITY_MPS2
     for axis, column in enumerate(values.T):
         same = column[1:] == column[:-1]
-        # coarse readings repeat throughout, and rates most in a long rest
+        # Coarse readings repeat often, and rates most often in a long rest, which a recording begins with.
         longest = max(map(_longest_by_chance, (same,) if sensor == "acc" else (same[: max(len(same) // 20, 50)], same)))
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
         for first, last in true_runs(same).tolist():
             if last - first < longest or clipped[first]:
                 continue
-            # The board turns where gravity moves, or a rate is far from rest, or others change. If both sensors froze,
-            # the sample that follows shows it; an accelerometer that froze alone may be shaken then.
+            # The board turns if gravity moves; for a gyroscope also if a rate is far from that at rest, or one changes.
+            # If both sensors froze, the sample after that shows the motion. It does not count for an accelerometer,
+            # which may be shaken there.
             end = last + (2 if sensor == "gyr" else 1)
             is_turning = np.ptp(recording.acc[first:end], axis=0).max() > swings
             if sensor == "gyr":
@@ -252,7 +256,7 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
 
 
 def _longest_by_chance(same: Mask) -> float:
-    """Return how many readings in a row repeat by chance at most, SHORTEST_RUN or more.
+    """Return the greatest number of readings in a row that repeat by chance, at least SHORTEST_RUN.
 
     same : (n,) True for a reading that repeats the one before.
     """
@@ -261,12 +265,14 @@ def _longest_by_chance(same: Mask) -> float:
 
 
 def _at_the_rail(values: Vector, ranges: Vector, may_stay: bool = False) -> Mask:
-    """Return (n,) True where an axis repeats its largest magnitude: few times at a chip's range, often elsewhere.
+    """Return (n,) True where an axis is clipped: it repeats its largest or smallest value.
 
-    Readings that are cut off are more often at the range than within its tolerance below; those of a slow peak, which
-    coarse steps repeat, are not.
+    At the end of one of `ranges` two samples are enough. Elsewhere a range is not known, and the value must repeat more
+    often than by chance. Clipped readings are equal to the largest value more often than they are just below it; at a
+    slow peak of coarse readings it is the other way round.
 
-    may_stay : a machine holds a rate, and then the end of a range that is not known must be far from the others.
+    may_stay : the values may stay the same without being clipped, as the rate of a machine does; then one whose range
+        is not known is clipped only far from the others.
     """
     clipped = np.zeros(len(values), bool)
     for column in np.ascontiguousarray(values.T):
@@ -286,13 +292,13 @@ def _at_the_rail(values: Vector, ranges: Vector, may_stay: bool = False) -> Mask
 def _is_motion(column: Vector, value: float) -> bool:
     """Return True if a rate is so far from the median of its column that only motion can explain it.
 
-    The first value is that of a rest, however steadily the board is turned after it.
+    A value with which the recording begins is that of a rest, even if most others are of a steady turn.
     """
     median = np.median(column)
     return bool(value != column[0] and abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)
 
 
 def _is_noisy(column: Vector, tolerance: float) -> bool:
-    """Return True if most readings differ from the one before, by steps of which two fit into the tolerance."""
+    """Return True if most readings differ from the one before, and two of the smallest steps are within tolerance."""
     steps = np.abs(np.diff(column))
     return bool(2 * np.count_nonzero(steps) > len(steps) and 2.0 * steps[steps > 0.0].min() < tolerance)

@@ -74,7 +74,7 @@ def not_converged(e: Evidence) -> Reason | None:
 
 def smoothed(e: Evidence) -> Reason | None:
     """Find accelerations that were computed or smoothed: only what a hand does below 3 Hz is left of its motion."""
-    away, bent = e.straying
+    away, bent = e.magnitude_errors
     if not away > SMOOTH * bent or bent > LEAST_BENT_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     return reason("not_raw", "smoothed", away=away, bent=bent)
@@ -147,7 +147,7 @@ def exchange(e: Evidence) -> tuple[float, float] | None:
     A calibration that is good leaves no doubt of them.
     """
     is_good = e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
-    return None if is_good else e.exchanged
+    return None if is_good else e.axes_exchanged_s
 
 
 def _coarse(e: Evidence, rms: float) -> Reason | None:
