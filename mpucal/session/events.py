@@ -97,8 +97,8 @@ class Checked(NamedTuple):
     Attributes
     ----------
     verifications : one for each orientation. agrees : None where the orientations show too little to decide.
-    reason : the likeliest cause, where they do not agree.
-    doubtful : True if it may be decided by one more orientation, and a new calibration that uses these.
+    reason : the likeliest cause, where they do not agree or do not decide.
+    doubtful : True if one more orientation may decide it, after a new first calibration that uses these orientations.
     """
 
     verifications: tuple[Verification, ...]
@@ -295,18 +295,20 @@ class Target(NamedTuple):
 
 
 class Knowledge(NamedTuple):
-    """Standard uncertainties of the accelerometer's parameters so far, after each orientation, or five seconds.
+    """Standard uncertainties of the accelerometer's parameters so far.
+
+    They are computed after each new orientation, and every five seconds without one.
 
     Attributes
     ----------
     gain_pct, misalignment_deg, bias_mg : (x, y, z) standard uncertainties (1 sigma) of the scale factor error [%], the
-        misalignment [deg] (of an axis' two the larger) and the bias [mg]. 1e3 or so: not observable yet.
+        misalignment [deg] (the larger one of an axis' two) and the bias [mg]. About 1e3: not observable yet.
     target : the target of each.
-    gain, misalignment, bias : (x, y, z) progress towards the target, 0..1. overall : the least of all nine.
+    gain, misalignment, bias : (x, y, z) progress towards the target, 0..1. overall : the least of these nine.
     down : unit vector in the board's axes: the orientation at rest that would reduce the uncertainty most.
         None where it was not requested.
     words : the largest uncertainty of each kind, as text.
-    doubt : one line where the data contradict each other already (a flipped axis, a wrong range), else empty.
+    doubt : one line if no sound sensor has such parameters (a flipped axis, a wrong range), else empty.
     """
 
     t_s: float
@@ -332,7 +334,7 @@ class Verification(NamedTuple):
     magnitude_mps2, magnitude_std_mps2 : |a| - g there, and its predicted standard uncertainty.
     direction_deg, direction_std_deg : angle between gravity as predicted by the gyroscope and as measured, and its
         predicted standard uncertainty.
-    agrees : True if both are within four of these. text : the result, as text.
+    agrees : True if both are within four predicted standard uncertainties of 0. text : the result, as text.
     """
 
     t_s: float
@@ -364,11 +366,11 @@ class FitKind(StrEnum):
 
 
 class RequestFit(NamedTuple):
-    """Command to the session's owner: compute this fit of all samples so far; answer after `wait_s` of samples more.
+    """Command to the session's owner: compute this fit of all samples so far, and answer `wait_s` of samples later.
 
     The answer always comes after the same number of samples, and is waited for if necessary, so that a replay equals
-    its session. KNOW and ADVISE are answered by Learnt, TRY by Tried, CHECK by Checked of the samples after the TRY, in
-    which `of` new orientations are needed.
+    its session. KNOW and ADVISE are answered by Learnt, TRY by Tried, and CHECK by Checked. CHECK compares the samples
+    since the TRY, which must show `of` new orientations.
     """
 
     kind: FitKind

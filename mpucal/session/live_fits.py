@@ -34,8 +34,9 @@ class Task(NamedTuple):
 
     Attributes
     ----------
-    samples : those that arrived since the last task. kind : the fit of all samples so far; None: no fit.
-    forget : drop the samples from this number on, and every fit of them; None: keep all. of : see RequestFit.
+    samples : those that arrived since the last task. kind : which fit of all samples so far to compute; None: no fit.
+    forget : number of the first sample to drop, with all after it and every fit of them; None: keep all.
+    of : see RequestFit.
     """
 
     samples: Samples
@@ -57,8 +58,9 @@ class Fits:
         self._store = SampleStore(sensor)
         self._flat: Flat | None = None
         self._known: InterimEstimate | None = None
+        # The first calibration, and the number of samples from which it was computed.
         self._tried: Evidence | None = None
-        self._since = 0
+        self._tried_count = 0
 
     def do(self, task: Task) -> Event | None:
         """Execute a task; return the answer, or None if it asks for no fit or the board has not lain flat yet."""
@@ -76,6 +78,7 @@ class Fits:
         return None
 
     def _learnt(self, advice: bool) -> Event | None:
+        """Compute the uncertainties so far, from the last estimate on; with `advice`, the orientation to ask for."""
         recording = with_masks(self._store.recording())
         if self._flat is None:
             segment = find_flat(recording)
@@ -91,16 +94,18 @@ class Fits:
         return Learnt(knowledge(self._known, self._target, float(recording.t[-1]), down), advice)
 
     def _try(self) -> Event:
+        """Compute the first calibration, and keep it for the comparison with new orientations."""
         recording = self._store.recording()
         evidence, _ = estimate(recording, self._plan.model, self._plan.gravity)
-        self._tried, self._since = evidence, len(recording)
+        self._tried, self._tried_count = evidence, len(recording)
         reasons = find_reasons(evidence)
-        # The rests may suffice for an estimate; without a gyroscope nothing can be verified.
+        # The rests alone may suffice for an estimate, but its verification needs a sound gyroscope.
         first_verdict = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
         shown = _most_specific_reason(reasons, evidence.recording)
         return Tried(first_verdict, shown and shown.about(recording.sensor.origin))
 
     def _check(self, of: int) -> Event:
+        """Compare the first calibration with the orientations since then, of which it must not have seen `of`."""
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, reason("verification_failed", "nothing"))
@@ -108,7 +113,7 @@ class Fits:
         after = recording.part(first, len(recording))
         for walk in evidence.walks:
             after = remove_change(after, evidence.flat, walk)
-        rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._since - first)
+        rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._tried_count - first)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((each for each in find_reasons(evidence) if each.code == CONTRADICTION), None)
         return judge_verification(rests, unseen[:of], of, recording, contradiction)
@@ -168,7 +173,7 @@ def knowledge(known: InterimEstimate, target: Target, t_s: float, down: Vector |
 
 
 def _doubt(D: Vector, known: InterimEstimate) -> str:
-    """Return why no good sensor would give these numbers; empty where one might, or while D is not known well."""
+    """Return why no sound sensor has these parameters; empty where one may have, or while D is not known well."""
     if known.D_std.max() > 0.02:
         return ""
     gains = np.diag(error_model.sensor_axes(D))
@@ -179,7 +184,7 @@ def _doubt(D: Vector, known: InterimEstimate) -> str:
     return ""
 
 
-# Faster samples are averaged to this rate: no motion of a hand is lost.
+# Faster samples are averaged to this rate, which shows all motion of a hand.
 MOST_HZ = 200.0
 
 

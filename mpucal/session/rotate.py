@@ -26,7 +26,7 @@ LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
 # Least interval of the fits and of the progress.
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
-# Interval of the fits while no new orientation is seen, which change the estimate little.
+# Interval of the fits while no new orientation is seen, since they change the estimate little.
 SHOW_EVERY_S = 5.0
 # The time that is left is estimated from the pace of at least this number of orientations. When fewer than this number
 # are left, the estimate also needs the information so far: at least the share LEAST_KNOWN of what the target needs.
@@ -62,6 +62,7 @@ class Rotate(PoseStep):
         self._known_number = 0
         self._held: tuple[Pause, events.Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
+        # A vehicle that lies flat is on the first side already.
         first = SIDES[1] if self._takes_sides and coverage.paused.near(-SIDES[0]) else self._farthest(coverage.paused)
         self.prompt = self._prompt_for(first)
 
@@ -90,6 +91,7 @@ class Rotate(PoseStep):
         return super().enough() if self._plan.until_end else [events.Turned(ENOUGH)]
 
     def _learn(self, knowledge: events.Knowledge, advice: bool) -> events.Outputs:
+        """Take new uncertainties: end the step if they reach the target, or ask for the orientation that helps most."""
         self._knowledge, self._requested, self._known_number = knowledge, False, self._coverage.number
         outputs: events.Outputs = [knowledge]
         if self._plan.until_end:
@@ -103,9 +105,10 @@ class Rotate(PoseStep):
             return [*outputs, events.Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._prompted_s = knowledge.t_s
-            # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
-            # even if the estimate takes up for down, as for a sensor whose axes are mirrored. Once the target is
-            # reached, or the vehicle was put down on all its sides, only a new orientation counts.
+            # The advice is not followed in three cases. Tilts all help alike, so each is asked for in turn. The same
+            # orientation is not asked for twice in a row, as happens where a sensor with mirrored axes makes the
+            # estimate take up for down. Once the target is reached, or a vehicle was on all sides, only a new
+            # orientation counts.
             down = np.array(knowledge.down)
             if self._plan.tilt_only or knowledge.down == self.prompt.down or self._adds_nothing(down):
                 down = self._farthest(self._coverage.paused)
@@ -138,6 +141,10 @@ class Rotate(PoseStep):
         return [] if self._plan.until_end else prompt
 
     def _hold(self, pause: Pause) -> events.Outputs:
+        """Return the outputs for a pause so far: countdown, new orientation, and what is asked for when it is over.
+
+        Where a side is asked for, the next one follows at once. Else the advice of a fit is requested.
+        """
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
         # A pause that the coverage has counted is not new any more: its use was decided before.
@@ -146,23 +153,24 @@ class Rotate(PoseStep):
         outputs: events.Outputs = [*pause.counting(self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
-        there = self._takes_sides and pause.is_near(self.prompt.down, MEANT_RAD)
-        least_s = REST_S if there else HOLD_S - WAIT_S
-        ends = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
-        counts = pause.seconds >= PAUSE_S - 1e-6 or (ends and there)
-        if counts and self._coverage.paused.add(pause.acc):
+        on_side = self._takes_sides and pause.is_near(self.prompt.down, MEANT_RAD)
+        least_s = REST_S if on_side else HOLD_S - WAIT_S
+        is_over = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
+        is_counted = pause.seconds >= PAUSE_S - 1e-6 or (is_over and on_side)
+        if is_counted and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
-        if ends and (side := self._next_side()) is not None:
+        if is_over and (side := self._next_side()) is not None:
             # The next side of a vehicle is known without a fit.
             self._advised_run, self._prompted_s, self.prompt = pause.run, pause.t_s, self._prompt_for(side)
             outputs += [pause.held(self._held[1]), self.prompt]
-        elif ends and not self._requested:
+        elif is_over and not self._requested:
             self._advised_run = pause.run
-            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, HAND_WINDOW_S if there else WAIT_S))
+            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, HAND_WINDOW_S if on_side else WAIT_S))
         return outputs
 
     def _request(self, kind: events.FitKind, t_s: float, wait_s: float = WAIT_S) -> events.RequestFit:
+        """Return the request of a fit, and note that and when it was made."""
         self._requested, self._known_s = True, t_s
         return events.RequestFit(kind, wait_s)
 
@@ -175,16 +183,16 @@ class Rotate(PoseStep):
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
             done = min(self._coverage.number, self._least)
-            outputs.append(events.Progress(t_s, done, self._least, self._count(), self._estimate_left_s(t_s)))
+            outputs.append(events.Progress(t_s, done, self._least, self._count_text(), self._estimate_left_s(t_s)))
         if not self._plan.until_end:
             outputs += self._remind(t_s, self._new_s, "no new orientation for a while")
         return outputs
 
-    def _count(self) -> str:
+    def _count_text(self) -> str:
         """Return the number of orientations as text; with the reason where more are asked for than the target needs."""
         number, least = self._coverage.number, self._least
         text = f"orientation {number} of {least}" if number <= least else f"{number} orientations, of at least {least}"
-        if not self._is_certain() or self._plan.tilt_only or self._plan.until_end:
+        if not self._has_target() or self._plan.tilt_only or self._plan.until_end:
             return text
         if number < least:
             return f"{text} (bars full; more sides confirm them)"
@@ -193,8 +201,8 @@ class Rotate(PoseStep):
     def _estimate_left_s(self, t_s: float) -> float | None:
         """Return the time until the end of the verification, at the pace of the orientations so far; None: unknown.
 
-        The orientations that the target needs at least are most often enough. Near their end the information counts: it
-        is the inverse of the variance, and grows by about as much with each orientation as so far.
+        The least number of orientations is most often enough. When few are left, the estimate uses the information too:
+        it is the inverse of the variance, and each orientation adds about as much to it as those before.
         """
         taken, left = self._coverage.number - 1, max(self._least - self._coverage.number, 0)
         if taken < FEW or self._plan.until_end or self._begun_s is None:
@@ -210,24 +218,25 @@ class Rotate(PoseStep):
             return None
         return max((left + self._aim.verify) * pace_s - since_s, self._aim.verify * pace_s)
 
-    def _is_certain(self) -> bool:
+    def _has_target(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _adds_nothing(self, down: Vector) -> bool:
         """Return True for an orientation that was seen, where the target is reached or a vehicle was on all sides."""
-        return (self._is_certain() or self._was_on_all_sides) and self._coverage.paused.near(-down)
+        return (self._has_target() or self._was_on_all_sides) and self._coverage.paused.near(-down)
 
     def _is_enough(self) -> bool:
         if self._coverage.number < self._least or self._plan.tilt_only:
             return self._coverage.number >= self._least
-        # Sides are not varied: they leave the angles between the axes to the gyroscope.
-        return (self._coverage.varied or self._was_on_all_sides) and self._is_certain()
+        # All sides are enough, though not varied: the gyroscope determines the angles between the axes.
+        return (self._coverage.varied or self._was_on_all_sides) and self._has_target()
 
     @property
     def _was_on_all_sides(self) -> bool:
         return self._takes_sides and all(self._coverage.paused.near(-side) for side in SIDES)
 
     def _time_out(self, t_s: float) -> events.Turned | None:
+        """Return the end of the step if its time is over; None if not."""
         known = f": {self._knowledge.words}" if self._knowledge else ""
         if t_s - self._new_s >= PATIENCE_S:
             return events.Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self._coverage.number} seen{known}")

@@ -34,8 +34,8 @@ class Runner:
     listeners : called with each prompt, such as the hand that turns a simulated board.
     open_next_part : called when the source has ended; returns True if another recorded part continues the session.
         The last part of a resumed session is the sensor itself.
-    late : called with True if a due answer is not there; returns True to poll the source meanwhile. In a replay it
-        returns what the recorded session did.
+    late : decides what to do while an answer is due: called with True if it is not computed yet; returns True to poll
+        the source meanwhile. In a replay it returns what it returned in the recorded session.
     start_worker : makes the worker that executes the live fits.
     checking : an existing calibration is checked; there are no live fits.
     """
@@ -139,7 +139,7 @@ class Runner:
         return written
 
     def _end_recording(self) -> None:
-        """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""
+        """Write a key into the capture: a replay then calibrates what was recorded, or aborts if that is too little."""
         key = Key.ENOUGH if self._dialogue.state is State.ROTATE else Key.ABORT
         self._note(KEY, self._source.now_ns(), {KEY: key.value})
 

@@ -32,7 +32,7 @@ class NewPoses(PoseStep):
         super().__init__(flat, plan, hold_s)
         self._of, self._seen, self._apart_rad, self._hold_s = of, seen, apart_rad, hold_s
         self._number = 0
-        # No orientation is taken once there are enough, or it is too late for more.
+        # True if no further orientation is taken: there are enough, or the time for them is over.
         self._closed = False
         self.prompt = self._next()
 
@@ -79,12 +79,13 @@ class NewPoses(PoseStep):
         raise NotImplementedError
 
 
-# Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
+# Bias and scale factor errors change angles between raw directions by up to a tenth. So raw directions must be farther
+# apart, by this factor, than the calibrated ones of new orientations.
 BENT = 1.1
 # Session time after which the first calibration is taken; the person turns the board meanwhile.
 TRY_WAIT_S = 2.5
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
-MOST_MORE = 2
+MOST_REPLACEMENTS = 2
 
 
 class Verify(NewPoses):
@@ -99,10 +100,12 @@ class Verify(NewPoses):
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat, plan, aim.verify, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
-        self._requested = False  # the first calibration
-        self._more = MOST_MORE
+        self._try_requested = False
+        self._replacements_left = MOST_REPLACEMENTS
+        # Result of the comparison after which the first calibration was computed again, and how many of the new
+        # orientations that calibration has used.
         self._doubt: events.Checked | None = None
-        self._known = 0  # new orientations that a first calibration has used that was computed again
+        self._used = 0
         self._now_s = 0.0
 
     def begin(self) -> list[events.Output]:
@@ -116,21 +119,22 @@ class Verify(NewPoses):
             self._begun_s = self._prompted_s = t_s
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
-        waits = self._closed
+        check_requested = self._closed
         outputs: events.Outputs = [*self._take(sightings)]
-        if not self._requested and t_s - self._begun_s >= WAIT_S:
+        if not self._try_requested and t_s - self._begun_s >= WAIT_S:
             # A person needs a moment to move: the first calibration uses as much as possible of the last rest.
-            self._requested = True
+            self._try_requested = True
             outputs.append(events.RequestFit(events.FitKind.TRY, TRY_WAIT_S))
-        if waits:
+        if check_requested:
             return outputs
         if not self._closed:
             outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
             if t_s - self._begun_s < VERIFY_PATIENCE_S:
                 return outputs
-            self._closed = self._number > self._known
+            # The time is over: what was held by now must do, if there is a new orientation.
+            self._closed = self._number > self._used
         if self._closed:
-            return [*outputs, events.RequestFit(events.FitKind.CHECK, WAIT_S, self._of - self._known)]
+            return [*outputs, events.RequestFit(events.FitKind.CHECK, WAIT_S, self._of - self._used)]
         if self._doubt is not None:
             return [*outputs, *self._end(self._doubt)]
         not_shown = reason("verification_failed", "not_shown")
@@ -151,7 +155,7 @@ class Verify(NewPoses):
         return [self._refusal or events.Finished(f"{ENOUGH}: not verified")]
 
     def _tried(self, tried: events.Tried) -> events.Outputs:
-        """Take the first calibration; one that is refused needs no verification."""
+        """Take the first calibration; one that is not good needs more orientations, and a refused one needs none."""
         if tried.verdict != GOOD and not self._closed:
             self._of = max(self._of, AIMS[QUICK].verify)
         if tried.verdict != REFUSED or tried.reason is None:
@@ -163,24 +167,27 @@ class Verify(NewPoses):
         """Take the comparison with the new orientations."""
         if checked.doubtful and self._doubt is None:
             return self._try_again(checked)
-        if checked.agrees is None and self._number >= self._of and self._more and self._doubt is None:
+        if checked.agrees is None and self._number >= self._of and self._replacements_left and self._doubt is None:
             # The fit has seen one of these orientations after all, or finds too short a rest: another one replaces it.
-            self._more, self._closed, self._begun_s = self._more - 1, False, None
+            self._replacements_left, self._closed, self._begun_s = self._replacements_left - 1, False, None
             self._number = self._of - 1
             self.prompt = self._next()
             return [self.prompt]
         return [*(self._counted(each) for each in checked.verifications), *self._end(checked)]
 
     def _counted(self, verification: events.Verification) -> events.Verification:
-        """Return a verification with its number among all orientations that were asked for; see `_known`."""
-        if not self._known:
+        """Return a verification with its number among all new orientations, with those that the calibration has used.
+
+        The first calibration uses some if it was computed again.
+        """
+        if not self._used:
             return verification
-        number, of = verification.number + self._known, verification.of + self._known
+        number, of = verification.number + self._used, verification.of + self._used
         text = verification.text.replace(f"{verification.number} of {verification.of}", f"{number} of {of}", 1)
         return verification._replace(number=number, of=of, text=text)
 
     def _end(self, checked: events.Checked) -> events.Outputs:
-        """Return the result of the verification."""
+        """Set the result of the verification, and return the outputs that end the step or offer to turn again."""
         self.checked = checked
         if checked.reason is None:
             return [events.Finished("verified: the new orientations agree with the predicted uncertainty")]
@@ -188,8 +195,8 @@ class Verify(NewPoses):
 
     def _try_again(self, checked: events.Checked) -> events.Outputs:
         """Compute the first calibration again, with the orientations so far, and request one more to verify it."""
-        self._doubt, self._closed, self._begun_s, self._requested = checked, False, None, False
-        self._known, self._of = self._number, self._number + 1
+        self._doubt, self._closed, self._begun_s, self._try_requested = checked, False, None, False
+        self._used, self._of = self._number, self._number + 1
         self.prompt = self._next()
         doubt = checked.reason.what if checked.reason else ""
         caution = events.Caution(self._now_s, "doubtful", doubt, "one more orientation decides if that matters")
@@ -206,7 +213,7 @@ class Verify(NewPoses):
         return [self.prompt, events.Caution(self._now_s, "refused", against.what, against.remedy)]
 
     def _next(self) -> events.Prompt:
-        """See NewPoses; the direction farthest from all rests is asked for."""
+        """See NewPoses; it asks for the direction that is farthest from all rests."""
         text = f"Verification {self._number + 1} of {self._of}: {{}}, then hold it still."
         return self._ask_for(events.PromptKind.VERIFY, self._farthest(self._seen), text)
 
@@ -238,7 +245,7 @@ class CheckPoses(NewPoses):
         return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
     def _next(self) -> events.Prompt:
-        """See NewPoses; the axis that differs most from all those shown, in either direction, as both show a bias."""
+        """See NewPoses; it asks for the axis farthest from those of all orientations: each direction shows a bias."""
         along = -self._directions @ self._seen.units.T
         down = self._directions[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
         text = f"Orientation {self._number + 1} of {self._of}: {{}}, or any other new one, then hold it still for 2 s."
