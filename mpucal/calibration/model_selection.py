@@ -186,9 +186,10 @@ class InPlaceFits:
         problem = _with_errors(self._problem, errors)
         if not near.converged:
             return None
-        if minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1).iterations == 0:
+        first = minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1)
+        if first.iterations == 0:
             return None
-        rough = minimise(_with_errors(self._thin, errors), near.theta, IMU, self._prior, until=ROUGHLY)
+        rough = minimise(_with_errors(self._thin, errors), first.theta, IMU, self._prior, until=ROUGHLY)
         imu = self._minimum(IMU, rough if rough.converged else near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
