@@ -1,7 +1,8 @@
 """The link to one vehicle: listen, lock to a vehicle, then receive from it and send to it alone.
 
-One thread: packets arrive only in `messages`, and every message of the vehicle goes to all listeners, whoever called
-`messages`. The time is the transport's, as of the last message or deadline: so a replay repeats it.
+There is no thread: packets are received only while somebody iterates over `messages`, and every message of the vehicle
+then goes to all listeners. The time is that of the last message or deadline, by the transport's clock, so that a replay
+repeats it.
 """
 
 from __future__ import annotations
@@ -17,21 +18,21 @@ from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .firmwares import Vehicle, vehicle_of
 from .transports import PAUSE_NS, ReceivedBytes, Transport
 
-# Our ids: a system other than the usual ground station's 255, and the component that autopilots expect of one.
+# Our ids: a system other than 255, the usual ground station's, and the component that autopilots expect of a station.
 OWN_SYSTEM, OWN_COMPONENT = 254, 190
 
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
 HEARTBEAT_NS = S
 SEQUENCE = 256
-# A packet that others overtook is at most LATE numbers late. Numbers start again after a silence, such as a reboot's,
-# which is reported as such.
+# Sequence numbers: a packet that others overtook is at most LATE numbers late. After a silence, as by a reboot, they
+# may start anew, and nothing counts as lost: the silence is reported by itself.
 LATE = 32
 SILENCE_NS = S
 # No network has more vehicles.
 MOST_SENDERS = 64
-# Largest number of pieces without a packet in PATIENCE_NS; more are a flood. A piece is a datagram, or as many bytes
-# of a serial line as the longest packet has. A bad link brings fewer; a line of 921,600 Bd that is read at another rate
-# brings more.
+# More pieces than this without a packet, while we wait for a vehicle, are a flood. A piece is a datagram, or as many
+# bytes of a serial line as the longest packet has. A bad link brings fewer; a line of 921,600 Bd read at another
+# rate brings more.
 FLOOD = 2000
 # Signatures count 10 us since 2015-01-01.
 SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
@@ -52,12 +53,12 @@ class Link:
     Parameters
     ----------
     transport : carries the packets; `close` closes it.
-    record : keeps each packet of the vehicle and of us, with its time [ns since 1970].
+    record : called with the time [ns since 1970] and the bytes of each packet of the vehicle, and of ours.
     key : 32 bytes with which both sides sign, or None. own_system : our MAVLink id.
 
     Attributes
     ----------
-    received, lost : number of the vehicle's packets since the lock, and of those lost by their sequence numbers.
+    received, lost : number of the vehicle's packets since the lock, and of those missing by their sequence numbers.
     heard_ns : time of its last packet.
     stations : ids of the other ground stations whose HEARTBEAT came from the vehicle's address.
     armed : True if the vehicle's last HEARTBEAT says that it is armed, None before the first.
@@ -160,7 +161,7 @@ class Link:
             self._transport.restrict(None)
 
     def encode(self, name: str, *fields: Any) -> Message:
-        """Return the message `name` to the vehicle; `fields` are those after target_system and target_component."""
+        """Return a message `name` for the vehicle; `fields` are those after target_system and target_component."""
         return getattr(self._mav, f"{name}_encode")(self.vehicle.system, self.vehicle.component, *fields)
 
     def send(self, message: Message) -> None:
@@ -204,7 +205,7 @@ class Link:
             yield message
 
     def restart(self) -> None:
-        """Forget the vehicle and what was heard: the transport goes on with another part of a session."""
+        """Forget the vehicle and all packets, as the transport goes on with the next part of a resumed session."""
         self._parsers.clear()
         self._queue.clear()
         self._before_lock.clear()
@@ -213,7 +214,10 @@ class Link:
         self._now_ns = self._next_heartbeat_ns = max(self._now_ns, self._transport.now_ns())
 
     def succeeds(self, attempt: Callable[[], bool], within_ns: int) -> bool:
-        """Repeat an attempt, which listens, until it returns True; return False if none did that began in time."""
+        """Repeat `attempt`, which takes time by listening, until it returns True; return False after `within_ns`.
+
+        The last one may end later than that.
+        """
         end_ns = self._now_ns + within_ns
         while not attempt():
             if self._now_ns >= end_ns:
@@ -233,11 +237,15 @@ class Link:
                 yield vehicle
 
     def _is_same_vehicle(self, arrived: _AddressedPacket) -> bool:
-        """Return True for the vehicle's HEARTBEAT, whatever its port."""
+        """Return True for a HEARTBEAT of the vehicle, from any address."""
         sender = vehicle_of(arrived.address, arrived.packet.message)
         return sender is not None and sender._replace(address=self.vehicle.address) == self.vehicle
 
     def _arrivals(self, until_ns: int) -> Iterator[_AddressedPacket]:
+        """Yield the packets that arrive until `until_ns`, and set the time; our heartbeats go out meanwhile.
+
+        It ends early after a pause of the program.
+        """
         while True:
             while self._queue and self._queue[0].t_ns < until_ns:
                 arrived = self._queue.popleft()
@@ -251,15 +259,16 @@ class Link:
                 self._queue.extend(self._parse(received))
             now_ns = self._transport.now_ns() if received is None else received.t_ns
             if self._vehicle is not None and now_ns - until_ns > PAUSE_NS:
-                # The program was suspended: the caller sees it by the time.
+                # The program was suspended, which the caller notices by `now_ns`.
                 until_ns = now_ns
                 break
-            # Bytes of strangers do not prolong the wait.
+            # Bytes that are no packets may come without end, so the wait ends though bytes were received.
             if now_ns >= until_ns and not self._queue:
                 break
         self._now_ns = max(self._now_ns, until_ns)
 
     def _parse(self, received: ReceivedBytes) -> list[_AddressedPacket]:
+        """Return the packets that bytes complete; count those without a packet as junk, and drop other senders'."""
         if self._vehicle is not None and not self._is_accepted(received.address, self._vehicle.address):
             return []
         if self._transport.datagrams and received.data[:1] not in MAGIC:
@@ -278,7 +287,7 @@ class Link:
         return packets
 
     def _is_accepted(self, address: str, known: str) -> bool:
-        """Return True for the vehicle's address and, while it is sought, for other ports of its host."""
+        """Return True for the vehicle's address `known` and, while it is sought, for other ports of its host."""
         return address == known or (self._seeking and address.rpartition(":")[0] == known.rpartition(":")[0])
 
     def _send_heartbeat(self) -> None:
@@ -305,6 +314,7 @@ class Link:
             self._record(self._now_ns, data)
 
     def _pack(self, message: Message) -> bytes:
+        """Return the bytes of our next message, signed if there is a key."""
         if self._vehicle is not None and self._vehicle.address in self._parsers:
             # A vehicle refuses packets that are a minute older than its own signatures.
             newest = self._parsers[self._vehicle.address].signed_at
@@ -314,7 +324,7 @@ class Link:
         return data
 
     def _count(self, message: Message) -> None:
-        """Count packets that are missing by their numbers; one that comes late was counted as missing before."""
+        """Count a packet, and those missing before it by their numbers; a late one is not missing any more."""
         header = message.get_header()
         self.received += 1
         self._signed += header.incompat_flags & SIGNED
@@ -331,9 +341,9 @@ class Link:
         self.heard_ns = self._now_ns
 
     def _new_receiver(self) -> Any:
-        """Return a MAVLink for one address: a forged packet must not change the signature times of another address.
+        """Return a MAVLink for one address, so that a forged packet cannot change another address' signature times.
 
-        Its time begins in 1970: without a battery or satellites, a vehicle's clock goes on where it stopped.
+        It accepts signatures of any time: the clock of a vehicle without a battery or satellites is years late.
         """
         mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
         mav.signing.secret_key = self._key
@@ -345,6 +355,7 @@ class Link:
         signing.timestamp = (self._now_ns - SIGNING_EPOCH_NS) // SIGNING_UNIT_NS
 
     def _no_vehicle(self) -> BusError:
+        """Return the error that explains why no vehicle was heard."""
         where = self._transport.name
         if self._key is not None and any(parser.refused for parser in self._parsers.values()):
             return LinkError(

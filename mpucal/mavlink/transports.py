@@ -1,6 +1,6 @@
-"""Transports, which move a link's bytes and have its clock: over UDP, TCP and serial lines, here.
+"""Transports over UDP, TCP and serial lines; a transport moves a link's bytes, and has its clock.
 
-A capture that is replayed and a simulated vehicle are transports, too. A connection or device that goes away is opened
+The replay of a capture and the simulated vehicle are transports, too. A connection or device that goes away is opened
 again.
 """
 
@@ -20,12 +20,12 @@ from ..clocks import US, S
 from ..errors import BusError, LinkError, NoAnswer
 from .url import Kind, Url
 
-# A receive that ends so long after its deadline was interrupted: SIGSTOP, or a suspended computer.
+# A receive that ends so much after its deadline was interrupted, by SIGSTOP or a suspended computer.
 PAUSE_NS = 3 * S
 CHUNK = 65536
 RETRY_NS = 500_000_000
 CONNECT_S = 5.0
-# Three IMUs may pile this up in a second in which a fit keeps the processor busy.
+# The stream of three IMUs in a second in which a fit keeps the processor busy.
 RECEIVE_BUFFER = 4 << 20
 
 
@@ -73,7 +73,7 @@ class Transport(Protocol):
 
 
 class SteadyClock:
-    """Time of day at the start, counted on by the monotonic clock, which nobody sets."""
+    """Clock that begins with the time of day and follows the monotonic clock: setting the time moves nothing."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
@@ -87,7 +87,7 @@ class Line(SteadyClock):
     """TCP connection, or serial line: an autopilot's USB port or a telemetry radio.
 
     While the other end is away nothing is received, and what is sent is lost. A board on USB may come back as another
-    port: it is looked for by its serial number. `name` stays that of `url`, as a link is locked to one address.
+    port; its serial number finds it. `name` stays that of `url`, since it is the address to which a link is locked.
 
     Raises
     ------
@@ -127,7 +127,7 @@ class Line(SteadyClock):
         """See Transport."""
 
     def close(self) -> None:
-        """See Transport. A board that comes back would get another name while its old port is open."""
+        """See Transport. It must be closed at once: a board that comes back while it is open gets another port."""
         if self._stream is not None:
             self._stream.close()
         self._stream = None
@@ -144,7 +144,7 @@ class Line(SteadyClock):
         return data
 
     def _reopen(self, until_ns: int) -> None:
-        """Try to open it again, at most every RETRY_NS; sleep otherwise."""
+        """Try to open it again, once in RETRY_NS; sleep between two tries, until `until_ns` at most."""
         now_ns = self.now_ns()
         if now_ns < self._next_try_ns:
             time.sleep(max(min(until_ns, self._next_try_ns) - now_ns, 0) * 1e-9)
@@ -159,7 +159,7 @@ class Line(SteadyClock):
 
 
 def _open_stream(url: Url) -> Any:
-    """Open a raw stream, whose reads and writes raise OSError once the other end is gone."""
+    """Open an unbuffered stream, whose reads and writes raise OSError once the other end is gone."""
     try:
         if url.kind is Kind.TCP:
             with socket.create_connection((url.host, url.port), CONNECT_S) as connection:
@@ -182,7 +182,7 @@ def _device(url: Url) -> str:
 
 
 def _usb_boards() -> dict[str, tuple[int, int, str]]:
-    """Return vendor, product and serial number of the boards on USB, by port, which may get another name."""
+    """Return vendor, product and serial number of the boards on USB, by the port that each has now."""
     from serial.tools.list_ports import comports  # noqa: PLC0415
 
     return {p.device: (p.vid, p.pid, p.serial_number) for p in comports() if p.vid and p.serial_number}

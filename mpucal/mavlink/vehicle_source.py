@@ -1,4 +1,4 @@
-"""A vehicle as a session's source: a link is locked to it, its parameters are read, and its IMUs streamed."""
+"""A vehicle as a session's source: it locks a link to one, reads its parameters, and has it stream its IMUs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .transports import PAUSE_NS
 
 POLL_NS = S // 20
 SILENT_NS = 4 * S
-# A reboot takes less, and so do most losses of a link.
+# The vehicle must be back within this time; a reboot takes less, and so do most interruptions of a link.
 BACK_NS = 30 * S
 LOOK_NS = S
 # A loss of this share is reported to the operator, once this many packets were sent.
@@ -39,7 +39,7 @@ class VehicleSource:
     link : not locked yet. rate_hz : to request. system : id of the vehicle to lock to, if there are several.
     say : shows the operator a sentence. name : of the recording.
     writes : the result will be written to the vehicle: then its parameters must name its sensors.
-    prepare : prepare a PX4; see Preparation. begun : called when the first message is heard that counts.
+    prepare : prepare a PX4; see Preparation. begun : called as the recorded messages begin, after the preparation.
     paused : called after a pause of the program or its computer, with the vehicle's time [ns] when it began.
     replayed : see lock_to_vehicle.
     """
@@ -80,7 +80,7 @@ class VehicleSource:
     def start(self) -> Sensor:
         """Listen, lock to one vehicle and say so, read its parameters, and request its streams.
 
-        The samples of another part of a session join those of before.
+        If it is called again for the next part of a resumed session, the samples are added to those so far.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class VehicleSource:
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []
-        # What was rebooted between two parts is back.
+        # A reboot between two parts needs no wait: the vehicle is back.
         self._rebooted &= first
         self._sampled_ns = self._link.now_ns()
         return sensor_of(self._stream, firmware, parameters, self._rate_hz)
@@ -124,7 +124,7 @@ class VehicleSource:
         list(self._link.messages(begun_ns + POLL_NS))
         pause_ns = self._link.now_ns() - begun_ns
         if pause_ns > PAUSE_NS:
-            # The samples of before are returned first.
+            # The next poll waits for the vehicle. This one returns the samples of before the pause.
             self._pause_ns = pause_ns
             self._interrupted_ns.append(sampled_ns)
             self._paused(sampled_ns)
@@ -152,7 +152,7 @@ class VehicleSource:
     def now_ns(self) -> int:
         """Return the vehicle's time: the last sample's, counted on by the link's clock."""
         last_us = self._rows[-1].t_us if self._rows else self._last_us
-        # Samples that came while it started are in the log alone.
+        # Before the first poll there are only the samples in the log, which came during the start.
         last_us, since_ns = self._log.latest if last_us is None else (last_us, self._sampled_ns)
         return round(last_us * 1e3) + self._link.now_ns() - since_ns
 
@@ -162,6 +162,7 @@ class VehicleSource:
             self._preparation.release()
 
     def _on_message(self, message: Message) -> None:
+        """Add a message to the log; keep the first IMU's sample for `poll`, and note a reboot."""
         row, jump = self._log.add(message, self._link.now_ns())
         self._rebooted |= jump is Jump.REBOOT
         if row is not None and row.reading.stream == self._stream:
@@ -194,7 +195,7 @@ class VehicleSource:
         self._say(f"The link loses {100 * share:.0f} % of the packets: a nearer or faster one is better.")
 
     def _report_changes(self) -> None:
-        """Say that parameters were changed while the vehicle streamed, once for all that changed together."""
+        """Say that parameters were changed while the vehicle streamed: one sentence for all since the last poll."""
         names = self._log.changed[self._changes_reported :]
         if not names:
             return
@@ -205,7 +206,7 @@ class VehicleSource:
         self._say(f"{names[0]} was changed while it was measured{by}: earlier samples are corrected where possible.")
 
     def _check_ids(self, parameters: Mapping[str, float]) -> None:
-        """Check before the vehicle is turned that a PX4 names a sensor: otherwise no slot can hold the result."""
+        """Check, before the vehicle is turned, that a PX4 has the id of a sensor: else no slot can hold the result."""
         if self._log.firmware != PX4 or not parameters or find_slot(PX4, 1, parameters) is not None:
             return
         what = f"{self._link.vehicle} names none of its accelerometers (all CAL_ACCn_ID are 0)"
@@ -239,18 +240,19 @@ class VehicleSource:
         return self._sampled_ns > begun_ns
 
     def _fault(self) -> str:
+        """Return what is wrong with the vehicle or its link, as the end of a sentence on the vehicle."""
         if self._rebooted:
             return "rebooted (its clock started again)"
         now_ns = self._link.now_ns()
         what, since_ns = "no IMU messages", self._sampled_ns
         if now_ns - self._link.heard_ns >= SILENT_NS:
-            # What was sent before a pause is not told from what was sent during it.
+            # `_sampled_ns` is later than `heard_ns` after a pause: what came during the pause is not known.
             what, since_ns = "nothing", max(self._link.heard_ns, self._sampled_ns)
         return f"has sent {what} for {(now_ns - since_ns) // S} s"
 
 
 def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None], *, replayed: bool = False) -> Vehicle:
-    """Listen, say which vehicle it is, and lock the link to it; nothing is sent before the operator can see that.
+    """Listen, say which vehicle it is, and lock the link to it; only then is anything sent to it.
 
     Parameters
     ----------
