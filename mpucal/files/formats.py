@@ -1,7 +1,7 @@
-"""The formats of recording files, a row each; a format's module is imported when such a file is read or written.
+"""Table of the formats of recording files; a format's module is imported when such a file is read or written.
 
-Several rows may share a suffix: the first that recognises a file reads it. One may read what none recognises, so that
-its error message says what is wrong.
+Several formats may share a suffix. The first one that recognises a file reads it. If none does, the one with `fallback`
+reads it, so that the error message says what is wrong with the file.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ FOLDER, ANY_TEXT = "/", ".txt"
 
 
 class Format(NamedTuple):
-    """A format of recording files; its functions are named "package.module:function", or empty if there is none.
+    """A format of recording files, with the names of its functions, such as "package.module:function"; empty: none.
 
-    A name that begins with a point is of this package.
+    A name that begins with a point is relative to this package.
 
     Attributes
     ----------
     suffixes : of its files' names, in lower case, with blanks between; FOLDER for a folder.
     what : the content of such a file, in words with an article.
     load : (path) -> Recording, the whole file. rows : (path) -> Rows, in bounded memory. One of them is enough.
-    recognises : (path) -> bool, True if a file of this suffix is of this format. Empty: every such file is.
+    recognises : (path) -> bool, True if a file with such a suffix is of this format. Empty: every such file is.
     writer : (path, rows, done) -> context of a Write; see open_writer.
     session : the capture file of sessions in this format; `load` and `rows` then take all parts of a resumed session.
     hinted : `load` and `rows` also take Hints; with hints, this format reads files that it does not recognise.
-    fallback : this format reads files of its suffixes that no row recognises.
+    fallback : this format reads files with its suffixes that no format recognises.
     """
 
     suffixes: str
@@ -103,7 +103,7 @@ FORMATS = (
     Format(".mcap", "a capture", ".capture:load_capture", rows=".capture:capture_rows", session=CAPTURE),
     Format(".tlog", "a MAVLink log", ".vehicle_logs:load_tlog", session=CAPTURE_OF_VEHICLE),
     Format(".bin", "a dataflash log of ArduPilot", ".vehicle_logs:load_dataflash", ".vehicle_logs:is_dataflash"),
-    # no other .bin is recognised as a recording, but each that is given is read as such
+    # Other .bin files are read if a user names one, but are not recognised as recordings in a folder.
     Format(".bin", "records of numbers", ".records:load_records", ".vehicle_logs:is_dataflash", **_ANY),
     Format(".ulg", "a log of PX4", ".ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", **_BAG),
@@ -151,7 +151,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
     of_suffix = [row for row in FORMATS if row.is_read and _suffix(path) in row.of]
     found = recognise(path)
     if hints.given and not (found and found.hinted):
-        # A recording of mpucal is not read as another program's file.
+        # Hints choose the reader of another program's file, but a recording of mpucal's own sessions needs none.
         if not (found and (found.session or FOLDER in found.of)):
             found = next((row for row in reversed(of_suffix) if row.hinted), found)
         if found is None or not found.hinted:
@@ -160,7 +160,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
                 f"{path} is {what}; it needs no options on how to read it",
                 "leave out --topic, --sensor, --columns, --units, --accel-range, --gyro-range and --rate",
             )
-    # text of any other suffix may be no table at all
+    # A suffix that no format has is not read by the fallback: such a text need not be a table.
     found = found or next((row for row in of_suffix if row.fallback and path.suffix.lower() in row.of), None)
     if found is None:
         if of_suffix and path.stat().st_size == 0:
@@ -173,7 +173,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix of a file's format: that of a table for text of any other suffix, such as .dat or .lvm."""
+    """Return the suffix by which the format is found: ANY_TEXT for text with an unknown one, such as .dat or .lvm."""
     if path.is_dir():
         return FOLDER
     suffix = path.suffix.lower()
@@ -217,6 +217,7 @@ def _list_formats(rows: Iterable[Format]) -> str:
 
 
 def _suffixes() -> str:
+    """Return what can be read, by suffix, as text: first mpucal's own files, then those of other programs."""
     read = [(suffix, row) for row in FORMATS if row.is_read for suffix in row.of]
     folders = " or ".join(row.what for suffix, row in read if suffix == FOLDER and not row.hinted)
     own = dict.fromkeys(suffix for suffix, row in read if suffix != FOLDER and not row.hinted)

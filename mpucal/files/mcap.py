@@ -1,6 +1,6 @@
-"""Reader of captures as MCAP files: every register access, or packet of a vehicle, and session event in order.
+"""Reader of captures: MCAP files of a chip's register accesses, or a vehicle's packets, and of the session's events.
 
-`capture_writer.py` writes them; a reader has no use for the library's writer, which takes long to load.
+`capture_writer.py` writes them. It is separate because the library's writer, which no reader needs, takes long to load.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from .messages import decode_message
 from .reading import LONGEST_CHUNK, first_bytes
 
 Record = Transaction | RawPacket | SessionEvent
-# as a file holds records
+# unit in which a file holds records: accesses come many at a time
 Block = Accesses | RawPacket | SessionEvent
 
-# of every MCAP file, and the head that follows: the length of its profile
+# beginning of every MCAP file, and the head that follows: it ends with the length of the file's profile
 MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8xBQI")
 FORMAT, VERSION_KEY = "mpucal.capture", "capture_version"
 VERSION = 2
@@ -40,7 +40,7 @@ IMU, ROS1, ROS2 = "sensor_msgs/msg/Imu", b"ros1", b"ros2"
 
 _REMEDY = "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
 
-# the last two: a length that exceeds all memory
+# What a damaged file may raise. The last two come of a length that exceeds all memory.
 _DAMAGED_BYTES = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, EOFError)
 _DAMAGE = (*_DAMAGED_BYTES, OverflowError, MemoryError)
 
@@ -51,7 +51,7 @@ class Capture(NamedTuple):
     Attributes
     ----------
     meta : metadata of `CaptureWriter.start`. records : in order of time.
-    recovered : None, or a sentence on the part of a damaged file that was read.
+    recovered : None if the file is whole; else a sentence on what was read of it, and what is lost.
     name : of the file, for messages.
     """
 
@@ -62,7 +62,7 @@ class Capture(NamedTuple):
 
 
 def read_capture(path: str | Path) -> Capture:
-    """Read a capture; of a file that was cut short, the whole part.
+    """Read a capture; of a damaged file, the records before the damage.
 
     Raises
     ------
@@ -74,11 +74,12 @@ def read_capture(path: str | Path) -> Capture:
 
 
 class CaptureReader:
-    """Iterator over the records of a capture, once; of a file that was cut short, over the whole part.
+    """Iterator over the records of a capture, once; of a damaged file, over the records before the damage.
 
     Attributes
     ----------
-    name : of the file, for messages. meta, recovered : see Capture; set with the first record, and when all are read.
+    name : of the file, for messages. meta : see Capture; known from the first record on.
+    recovered : see Capture; known when all records are read.
 
     Raises
     ------
@@ -96,7 +97,7 @@ class CaptureReader:
         return one_by_one(self.blocks())
 
     def blocks(self) -> Generator[Block]:
-        """Yield the records, register accesses by the block as in the file."""
+        """Yield the records in blocks, as they are in the file."""
         with reading(self._path, CaptureError), check_regular(self._path).open("rb") as file:
             yield from self._blocks(file)
 
@@ -106,7 +107,7 @@ class CaptureReader:
         file.seek(0)
         channels: dict[int, Channel] = {}
         headed = False
-        whole, finished = 0, False
+        whole, finished = 0, False  # number of bytes before any damage, and whether the end was reached
         stream = _SizeLimitedFile(file, size)
         items = _records(
             StreamReader(cast("IO[bytes]", stream), emit_chunks=True, validate_crcs=True, record_size_limit=size)
@@ -115,7 +116,7 @@ class CaptureReader:
             try:
                 item = next(items, None)
             except _DAMAGE:
-                # everything read so far is whole; `recovered` tells the rest
+                # What was read so far is whole; `recovered` says what is lost.
                 break
             whole, finished = stream.at, item is None
             if isinstance(item, Metadata) and item.name == FORMAT:
@@ -168,7 +169,7 @@ class CaptureReader:
 
 
 def is_mcap_of_ros(path: Path) -> bool:
-    """Return True if an MCAP file begins as one of ROS, and not as a capture."""
+    """Return True if an MCAP file is a bag of ROS and not a capture, by its first bytes."""
     begun = first_bytes(path)
     if len(begun) < _HEAD.size or FORMAT.encode() in begun[: _HEAD.size + 100]:
         return False
@@ -187,7 +188,7 @@ def one_by_one(blocks: Iterable[Block]) -> Iterator[Any]:
 
 
 def _records(reader: StreamReader) -> Iterator[McapRecord]:
-    """Yield all records; a chunk is unpacked only if its size is allowed."""
+    """Yield all records, those of chunks too; raise an error for a chunk that would take too much memory."""
     for record in reader.records:
         if not isinstance(record, Chunk):
             yield record
@@ -199,7 +200,7 @@ def _records(reader: StreamReader) -> Iterator[McapRecord]:
 
 
 class _SizeLimitedFile:
-    """File of `size` bytes that never reads more of them, since a damaged length would take all memory.
+    """File that reads at most its `size` bytes, however many are asked for: a damaged length would take all memory.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Recordings as runs of samples, for files that are larger than memory, and checks of samples without metadata."""
+"""Recordings read a run of samples at a time, for files that are larger than memory, and checks of their samples."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from .tables.times import how_often
 from .tables.units import QUANTITIES
 
 SI = {"acc": "m/s^2", "gyr": "rad/s"}
-# attributes of rows that are those of a recording
+# attributes that Rows and Recording share
 _KNOWN = ("sensor", "flat", "autopilot", "recovered", "name", "utc_ns", "taken")
 S = TypeVar("S", bound=Samples)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A recording as runs of samples; numbers may be missing (NaN).
+    """A recording as runs of consecutive samples; numbers may be missing (NaN).
 
     Attributes
     ----------
-    runs : of some RUN samples each at most; can be iterated once.
-    sensor, flat, autopilot, recovered, name, utc_ns, taken : as of a Recording.
+    runs : of about RUN samples at most; can be iterated once.
+    sensor, flat, autopilot, recovered, name, utc_ns, taken : see Recording.
     others : number of further IMUs in the file.
-    done : the processing of samples that are calibrated already; empty if they are not.
+    done : how samples that are calibrated already were processed; empty if they are not calibrated.
     noise : (2, 3) standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
-    plain : units are known only by convention.
-    interrupted : as of a Recording; complete when the runs have been read.
+    plain : True if the file does not say in which units it is: SI is the convention, but the values may show others.
+    interrupted : see Recording; complete when the runs have been read.
     """
 
     runs: Iterator[Samples]
@@ -59,7 +59,7 @@ class Rows:
         return cls(runs, **known, others=len(recording.others), done=done, interrupted=[*recording.interrupted])
 
     def recording(self) -> Recording:
-        """Return the whole recording, checked; a plain one has even times and SI units."""
+        """Return the whole recording, as of Recording.from_arrays; a `plain` one is converted to SI by its values."""
         samples, remarks = Samples.joined(list(self.runs)), [self.taken, *self.notes()]
         if self.plain and len(samples):
             found = shown_units([samples], self.sensor)
@@ -71,12 +71,12 @@ class Rows:
         return replace(whole, **known, interrupted=tuple(self.interrupted))
 
     def in_si(self, units: Mapping[str, str]) -> Self:
-        """Return the rows with samples in SI units that were in `units`, and a sentence on those."""
+        """Return the rows, converted from `units` to SI, and with a sentence on these units in `taken`."""
         taken = " ".join(filter(None, (self.taken, describe(self.name, units)))) or None
         return replace(self, runs=(to_si(samples, units) for samples in self.runs), taken=taken)
 
     def notes(self) -> list[str]:
-        """Return sentences on the samples, when the runs have been read."""
+        """Return sentences on the samples; call it when the runs have been read."""
         remarks = [f"{describe_done(self.name, self.done)}."] if self.done else []
         if self.plain and self.interrupted:
             remarks += [
@@ -106,7 +106,7 @@ def describe(name: str, units: Mapping[str, str]) -> str:
 
 
 def arrival_clock(runs: Iterator[Samples], sensor: Sensor) -> Clock | None:
-    """Return the clock behind the stamps of all runs, if those of the first are of arrival; otherwise None."""
+    """Return the clock with which the samples were taken, if the first run's times are of arrival; otherwise None."""
     first = next(runs, None)
     if first is None or not clock_of(first.t, sensor).jitter_s:
         return None
@@ -122,7 +122,7 @@ def with_times(runs: Iterable[Samples], clock: Clock) -> Iterator[Samples]:
 
 
 def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
-    """Return the units of `acc` and `gyr` in the first of the runs that shows them; empty if SI, or if none does."""
+    """Return the units of `acc` and `gyr` by their values, in the first run that shows them; SI units are left out."""
     seen = dict.fromkeys(SI, "")
     for samples in runs:
         kept = drop_incomplete(samples)
@@ -136,23 +136,23 @@ def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
 
 
 def to_si(samples: S, units: Mapping[str, str]) -> S:
-    """Return samples in SI units that were in `units`."""
+    """Return samples, converted from `units` to SI."""
     return replace(samples, **{key: getattr(samples, key) * QUANTITIES[key][of] for key, of in units.items() if of})
 
 
 def is_complete(acc: Vector, gyr: Vector) -> Mask:
-    """Return (n,) True where a sample has all its numbers; an accelerometer alone has no rates at all."""
+    """Return (n,) True where a sample has all its numbers: three accelerations, and three rates or none."""
     rates = is_plausible(gyr).all(axis=1)
     return np.asarray(is_plausible(acc).all(axis=1) & (rates | ~rates.any()))
 
 
 def drop_incomplete(samples: S) -> S:
-    """Return the samples that have all their numbers; where more than one in a row has not, is a gap."""
+    """Return the samples that have all their numbers, with a gap where several in a row are dropped."""
     complete = is_complete(samples.acc, samples.gyr)
     if complete.all():
         return samples
     at = np.flatnonzero(complete)
-    # a gap before a sample that is left out is one before the next
+    # A gap before a dropped sample is one before the next sample that is kept.
     gaps = np.cumsum(samples.gap)[at]
     gap = (np.diff(gaps, prepend=0) > 0) | are_gaps(at)
     kept: dict[str, Any] = vars(samples.at(at)) | {"gap": gap}
