@@ -31,25 +31,25 @@ DRIVER_VERSION = 6
 
 # The driver gives up after this time without a valid sample.
 DEAD_NS = 2_000_000_000
-# A longer poll counts as this long: a host that slept says nothing about the chip. It is also the time-out of an
-# adapter on a bus that is held: no reply brings the time that it took.
+# A longer poll counts as this long, since a host that slept says nothing about the chip. A poll on a bus that is held
+# counts as this much longer: an adapter waits for its time-out, and no reply tells how long it was.
 LONGEST_POLL_NS = 500_000_000
 
 # Longer than the chip takes to write a frame, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
 
-# An overflow drops the oldest bytes: a FIFO that is this many frames short of full may have lost the alignment.
+# An overflow drops the oldest bytes, and the alignment is lost. A FIFO may have overflowed if no more frames are free.
 SPARE_FRAMES = 3
-# Share of the samples; jerks of a hand pass for flipped bits four times in ten thousand.
+# A larger share of repaired samples is reported; a hand's jerks are taken for flipped bits in four of 10,000 samples.
 MAX_REPAIRED_SHARE = 0.001
-# Fewer overflows may come from a host that was late.
+# So many overflows show that a bus is too slow; fewer may come from a host that was late.
 REPEATED_OVERFLOWS = 3
 
 # INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile.
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
 # The status and a sample of a chip without a FIFO, in one read.
 SAMPLE_BYTES = reg.ACCEL_XOUT_H + reg.FRAME_BYTES - reg.INT_ENABLE
-# Reads whose times are those of samples: first register and number of bytes. They may be repeated.
+# Reads whose times become those of samples, as (first register, number of bytes). They may be repeated after an error.
 TIMED_READS = frozenset(((reg.FIFO_COUNT_H, 2), (reg.INT_ENABLE, SAMPLE_BYTES)))
 NO_FIFO = "the chip's FIFO stays empty: its samples are read one by one, with the computer's times"
 
@@ -73,7 +73,7 @@ class Driver:
 
     Attributes
     ----------
-    settings : of the started chip. faults : number of polls that were not accepted, by reason.
+    settings : of the started chip. faults : number of polls whose samples were not accepted, by reason.
     """
 
     settings: Settings
@@ -99,7 +99,7 @@ class Driver:
         self._frame_ns = math.inf
 
     def now_ns(self) -> int:
-        """Return the last time of the bus's clock, at the host's rate as far as that is known."""
+        """Return the time of the last access, in the provisional times of the samples."""
         fifo, now_ns = self._decoder.fifo, self._port.now_ns
         return now_ns if fifo is None else fifo.provisional_ns(now_ns)
 
@@ -192,11 +192,12 @@ class Driver:
         self._port.read(reg.PWR_MGMT_1, 2)
 
     def _read_offsets(self) -> None:
-        # The oldest family first: a capture replays only with the same accesses.
+        # In the order of FAMILIES, which must stay: a capture replays only with the same accesses.
         for first, _, last in reversed(PLACES):
             self._port.read(first, last + 2 - first)
 
     def _correction_remark(self) -> str | None:
+        """Return a sentence for the user if the offset registers held a correction, which the reset removed."""
         if self._decoder.corrected is None:
             return None
         before, trim = self._decoder.corrected
@@ -206,7 +207,7 @@ class Driver:
         )
 
     def _drain_fifo(self) -> Need:
-        """Read all whole frames; return what the chip needs next."""
+        """Read all whole frames in the FIFO, and feed them to the decoder; return what the chip needs next."""
         count, begun_ns = self._fifo_count(), self._port.now_ns
         self._plan_next_poll()
         settings = self.settings
@@ -219,14 +220,14 @@ class Driver:
                 self._port.read_destructive(reg.FIFO_R_W, frames * reg.FRAME_BYTES)
             self._port.read_destructive(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
-            # The bytes or the flag are gone from the chip: a second read would begin within a frame.
+            # The read may have removed the bytes or the flag from the chip: a repeated one would begin within a frame.
             return Need.RESTART
         if frames:
             self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
         return self._after_poll()
 
     def _read_samples(self) -> Need:
-        """Read samples one by one for a poll's period; return what the chip needs next."""
+        """Read samples one by one, without a FIFO, for a poll's period; return what the chip needs next."""
         step_ns = round(1e9 / self._config.rate_hz)
         for _ in range(max(1, round(self._period_s * self._config.rate_hz))):
             self._port.sleep_until(self._next_poll_ns)
@@ -267,6 +268,7 @@ class Driver:
         self._restart()
 
     def _set_up_again(self) -> None:
+        """Reset, wake and configure the chip, after a check that it is still the same one."""
         answer = self._port.read(reg.WHO_AM_I, 1)[0]
         part = self.settings.part
         if answer != part.who_am_i:
@@ -284,6 +286,7 @@ class Driver:
         self._plan_next_poll()
 
     def _fifo_count(self) -> int:
+        """Return the number of bytes in the FIFO, of whole frames if possible."""
         count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
         if count % reg.FRAME_BYTES:
             # The chip is writing a frame, or the FIFO has slipped.
@@ -292,12 +295,13 @@ class Driver:
         return count
 
     def _plan_next_poll(self) -> None:
+        """Set the time of the next poll, which varies by up to a sample interval, see poll_phase."""
         in_s = self._period_s + poll_phase(self._polls) * min(self._period_s, 1 / self._config.rate_hz)
         self._polls += 1
         self._next_poll_ns = self._port.now_ns + round(in_s * 1e9)
 
     def _spent_ns(self, begun_ns: int, trouble: BusError | ChipError | None) -> int:
-        """Return the time this poll took, as far as it counts against the chip."""
+        """Return the time that this poll took, limited to what the chip is to blame for."""
         held_ns = LONGEST_POLL_NS if isinstance(trouble, BusHeld) else 0
         return min(self._port.now_ns - begun_ns, LONGEST_POLL_NS) + held_ns
 

@@ -30,10 +30,10 @@ ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 MAX_TEMPERATURE_STEP = 400
 # The first frame after a reset may have been cut by it, and the filters are not settled.
 DROPPED_FRAMES = 2
-# Noise changes some of a frame's seven words from one frame to the next: this many equal frames, over this time, are
-# one that the chip repeats.
+# Noise changes some of a frame's seven words from one frame to the next. So if this many frames, over this time, are
+# equal, the chip repeats one.
 STUCK_FRAMES, STUCK_S = 10, 0.05
-# Step between two times that the regression would put in the wrong order, in sample intervals.
+# Least step between two sample times, in sample intervals: the regression of the clock may put them in wrong order.
 LEAST_STEP = 0.1
 
 
@@ -49,8 +49,9 @@ class Run(NamedTuple):
 class FifoDecoder:
     """Decoder of the bytes of the FIFO to samples, live or from a capture.
 
-    A poll is `set_count`, then `add_bytes` if there were any, then `finish_poll` with the overflow flag: the bytes are
-    accepted only then, since the FIFO may have overflowed while it was read. Every reset of the FIFO is a `reset`.
+    Call `set_count` for each poll, then `add_bytes` if there were any, then `finish_poll` with the overflow flag. The
+    bytes are accepted only then, since the FIFO may have overflowed while it was read. Call `reset` after each reset of
+    the FIFO.
 
     Attributes
     ----------
@@ -81,7 +82,7 @@ class FifoDecoder:
         return self._flips.repaired
 
     def set_temperature(self, count: int) -> None:
-        """Set the count of the temperature register, which an aligned frame shows too."""
+        """Set the count of the temperature register, with which the first frame is compared to see its alignment."""
         self._temperature = count
 
     def add_clock_pairs(self, t_ns: Whole, host_ns: Whole) -> None:
@@ -99,10 +100,10 @@ class FifoDecoder:
         self._pending += data
 
     def finish_poll(self, overflow: bool, lost: bool = False) -> Loss | None:
-        """Accept what the poll read, or return why not; then only a reset helps.
+        """Accept what the poll read, or return why not; then the FIFO must be reset.
 
-        Equal frames at the end are held back until a different one follows them, and a last frame in which a bit may be
-        flipped until the next one. `lost`: the chip was reset meanwhile.
+        Two kinds of frames at the end wait for the next poll: equal ones, in case the chip repeats itself, and a last
+        one in which a bit may be flipped. `lost`: the chip was reset meanwhile.
         """
         data, counted = bytes(self._pending), self._counted
         self._pending.clear()
@@ -180,7 +181,7 @@ class FifoDecoder:
         self._read = self._odd_bytes = 0
 
     def take(self) -> Samples:
-        """Return the samples since the last `take`, with increasing provisional times."""
+        """Return the samples since the last call, with increasing provisional times."""
         runs, self._taken = self._runs[self._taken :], len(self._runs)
         if not runs:
             return Samples.empty()
@@ -189,12 +190,12 @@ class FifoDecoder:
         return samples
 
     def release(self) -> list[Run]:
-        """Hand over the frames since the last call; `final` makes samples of them once there are no more."""
+        """Return the frames since the last call, and forget them; `final` makes samples of them when all are read."""
         runs, self._runs, self._taken = self._runs, [], 0
         return runs
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
-        """Yield the samples of released runs, in the same order, with final times."""
+        """Yield the samples of the runs that `release` returned, in the same order, with final times."""
         times_s = self._final_times()
         last_t_s: float | None = None
         for run in runs:
@@ -239,7 +240,7 @@ class FifoDecoder:
         return lambda segment, index: host_s(times_s(segment, index))
 
     def _temperature_jumps(self, frames: Counts) -> Mask:
-        """Return (n,) True where the temperature jumps, as in a frame that is not aligned."""
+        """Return (n,) True where the temperature jumps: such a frame is not aligned."""
         if not len(frames):
             return np.zeros(0, bool)
         temperature = frames[:, TEMPERATURE].astype(np.int32)
@@ -249,7 +250,7 @@ class FifoDecoder:
         return np.asarray(np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
 
     def _move_after(self, last_t_s: float | None, samples: Samples) -> Samples:
-        """Move the samples' times, if needed, so that each is later than `last_t_s`."""
+        """Return the samples with times that are later than `last_t_s` and increase, changed only if needed."""
         step_s = LEAST_STEP / self._clock.rate_hz
         if last_t_s is None or samples.t[0] - last_t_s >= step_s:
             return samples
