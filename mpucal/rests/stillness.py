@@ -1,6 +1,6 @@
 """Stillness detection from windows of samples: whether the board is still, for how long, and how it moved.
 
-One detector judges windows one after the other as they come, and all windows of a recording at once.
+The same detector is used live, a window at a time, and for all windows of a recording.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from .windows import CutWindows, Spreads, Window, of_rows
 BUMP_S = 2.0
 BUMP_RAD = math.radians(3.0)
 
-# A hand's limits are learned from the newest windows that may be rests: from more than the fewest.
+# A hand's limits are learned from the newest windows that may be rests: at most NEWEST, and more than FEWEST of them.
 FEWEST_WINDOWS, NEWEST_WINDOWS = 2, 12
 
-# Two means of noise differ by at most this many standard deviations.
+# Means of pure noise differ by at most this many standard deviations.
 CHANCE = 4.5
 
 
@@ -42,7 +42,7 @@ CHANCE = 4.5
 class Still:
     """Stillness for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,).
 
-    run : number of the still run, which counts up where the board was moved, and not where it was only bumped.
+    run : number of the still run; a new run begins when the board was moved, but not when it was only bumped.
     """
 
     seconds: float
@@ -55,7 +55,8 @@ class Still:
 class Moved:
     """Motion after `after_s` of stillness.
 
-    what : which sensor measured it, how much and about which axis. lost : samples are missing, and motion is possible.
+    what : how the board moved and about which axis, for a message. lost : True if samples are missing, so that it may
+        have moved.
     """
 
     after_s: float
@@ -71,7 +72,10 @@ class Sighting(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Shares of the limits that windows (..., 3) use; above 1 they are not still."""
+    """Motion in windows (..., 3), as shares of the limits of a rest: above 1, a window is not still.
+
+    acc, gyr : of the standard deviations. turning : of the mean rate.
+    """
 
     acc: Vector
     gyr: Vector
@@ -92,13 +96,13 @@ class Detector:
     ----------
     limits : of a window at rest. noise : (3,) standard deviations of the accelerometer [m/s^2] and the gyroscope
         [rad/s] at rest; None: those of the quietest window so far.
-    bias : (3,) rad/s of the gyroscope; a number where it is not known, the largest bias possible.
-    learns : widen the limits to those of a hand that trembles as this one does.
+    bias : (3,) rad/s of the gyroscope; or, where it is not known, a number: the largest possible magnitude.
+    learns : True to widen the limits to the tremor of this hand.
 
     Attributes
     ----------
-    level : largest share of the limits that the last window used; above 1 it moves.
-    rest_rad_s : (3,) mean rate of the last still run, the gyroscope's bias.
+    level : motion in the last window, as the largest share of a limit; above 1 it moves.
+    rest_rad_s : (3,) mean rate of the last still run, which is the gyroscope's bias.
     """
 
     def __init__(
@@ -108,13 +112,13 @@ class Detector:
         bias: Vector | float = MOST_BIAS_RAD_S,
         learns: bool = False,
     ) -> None:
-        self._limits, self._least, self._learns = limits, limits, learns
+        self._limits, self._given_limits, self._learns = limits, limits, learns
         self._quietest = noise is None
         unknown: Vector = np.full(3, np.inf)
         self._acc_noise, self._gyr_noise = noise if noise is not None else (unknown, unknown)
-        self._bias, self._turns = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
+        self._bias, self._most_rate = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
         self._spreads: deque[tuple[float, float]] = deque(maxlen=NEWEST_WINDOWS)
-        # These are sums over the windows of this run.
+        # Number, duration and sums of the windows of this run.
         self._count = 0
         self._seconds: float = 0
         self._acc, self._gyr = np.zeros(3), np.zeros(3)
@@ -125,17 +129,17 @@ class Detector:
         self.rest_rad_s = self._bias
 
     def shares(self, windows: Spreads) -> Shares:
-        """Return the shares of the limits that windows use, each by itself."""
-        acc_limit, gyr_limit = self._most
+        """Return the motion in each window, as shares of the limits."""
+        acc_limit, gyr_limit = self._most_sd
         vibration = math.sqrt(self._limits.vibration) * windows.acc_noise
         return Shares(
             windows.acc_sd / np.maximum(acc_limit, vibration),
             windows.gyr_sd / gyr_limit,
-            np.abs(windows.gyr - self._bias) / self._turns,
+            np.abs(windows.gyr - self._bias) / self._most_rate,
         )
 
     @property
-    def _most(self) -> tuple[Vector, Vector]:
+    def _most_sd(self) -> tuple[Vector, Vector]:
         """Limits (3,) of the standard deviations for this sensor."""
         return (
             np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
@@ -148,7 +152,7 @@ class Detector:
         return self._seconds
 
     def forget(self) -> None:
-        """Begin a new run: the next window has nothing to do with those before."""
+        """Begin a new run, as after a gap."""
         self._begin()
 
     def add(self, window: Window) -> Still | Moved:
@@ -176,7 +180,7 @@ class Detector:
         return Still(self.seconds, acc, self.rest_rad_s, self._number)
 
     def _learn(self, window: Window) -> None:
-        """Widen the limits to those of a hand that trembles as in this window and those before."""
+        """Widen the limits to the tremor in this window and those before, unless no hand trembles so much at rest."""
         beyond = math.sqrt(max(float((window.gyr_sd**2 - self._gyr_noise**2).max()), 0.0))
         turning = float(np.abs(window.gyr - self.rest_rad_s).max())
         if not (beyond < ANY_HAND.gyro_sd and turning < QUIET.gyro_mean):
@@ -184,9 +188,10 @@ class Detector:
         self._spreads.append((beyond, turning))
         spread, speed = np.array(self._spreads).T
         noise = float(self._gyr_noise.max())
-        self._limits = learned(spread, speed, noise, FEWEST_WINDOWS, self._least)
+        self._limits = learned(spread, speed, noise, FEWEST_WINDOWS, self._given_limits)
 
     def _bumped(self, window: Window, what: str) -> Moved:
+        """Take a window with motion: pause the run, and end it if the motion is more than a bump."""
         moved = Moved(self.seconds, what, lost=not window.whole)
         if self._count:
             seconds = window.end_s - window.start_s
@@ -213,7 +218,7 @@ class Detector:
         return self._acc / self._count, self._gyr / self._count
 
     def _shaken(self, window: Window) -> str:
-        """Return how the window itself shows motion; empty if it shows none."""
+        """Set the level; return the motion within the window, as text; empty if there is none."""
         shares = acc, gyr, turning = self.shares(window)
         self.level = float(shares.level)
         if not window.whole:
@@ -225,15 +230,15 @@ class Detector:
         return _shook(window.acc_sd, acc) if acc.max() > 1.0 else ""
 
     def _stepped(self, window: Window) -> str:
-        """Return how the window shows motion since the run before it; empty if it shows none."""
+        """Raise the level; return the motion between the run so far and the window, as text; empty if there is none."""
         if not self._count:
             return ""
         acc, gyr = self._means()
         acc_step, gyr_step = window.acc - acc, window.gyr - gyr
-        # A mean over a window is off by part of a slow tremor in it, and with few samples by their noise.
+        # Two means differ by a slow tremor, up to the standard deviation, and by noise, more so if samples are few.
         share = max(1.0, CHANCE * math.sqrt((1.0 + 1.0 / self._count) / window.count))
         # A spike, or vibration, spreads a window further, but its mean hardly.
-        acc_sd = np.minimum(window.acc_sd, self._most[0])
+        acc_sd = np.minimum(window.acc_sd, self._most_sd[0])
         acc_ratio = np.abs(acc_step) / (self._limits.acc_step + share * acc_sd)
         gyr_ratio = np.abs(gyr_step) / (self._limits.gyro_step + share * window.gyr_sd)
         self.level = float(max(self.level, acc_ratio.max(), gyr_ratio.max()))
@@ -246,7 +251,7 @@ class Detector:
 
 
 def is_untouched(acc: Vector) -> bool:
-    """Return True if an accelerometer's rows (n, 3) [m/s^2] are of a board that nobody touches."""
+    """Return True if an accelerometer's readings (n, 3) [m/s^2] are so quiet that nobody touches the board."""
     silent = np.zeros(3)
     return bool(Detector(UNTOUCHED, (silent, silent)).shares(of_rows(acc, np.zeros_like(acc))).level < 1.0)
 
@@ -262,9 +267,10 @@ def _shook(acc_sd: Vector, ratio: Vector) -> str:
 
 
 def still_windows(detector: Detector, windows: CutWindows) -> Iterator[tuple[int, int, int]]:
-    """Yield the number of its run, and the first and last + 1 of its samples, for each still window.
+    """Yield (number of its run, first, last + 1 of its samples) for each still window.
 
-    The limits are known beforehand: all windows are compared with them at once.
+    All windows are compared with the limits at once, so `detector` must not change them: it neither learns nor looks
+    for the quietest window.
     """
     moving = detector.shares(windows).level > 1.0
     for k, moves in enumerate(moving.tolist()):
