@@ -2,8 +2,9 @@
 
     b_a,k = b_a + slope (T_k - T_0) + e_k,    e_k with the standard deviation of calibration k,
 
-is a straight line for each axis, by weighted least squares. T_0 is the weighted mean of the T_k, where b_a and slope
-are independent. D is the weighted mean: if D changes too, half of its change remains at the ends.
+is a straight line for each axis, by weighted least squares. T_0 is the weighted mean of the T_k, at which the errors of
+b_a and slope are independent. D is the weighted mean: if D changes with temperature too, half of its change remains as
+an error at the lowest and highest temperature.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from .calibration import GOOD, REFUSED, Calibration
 from .comparison import compare, in_body_frame
 from .correlation import UNCORRELATED
 
-# a chip's thermometer is accurate to a degree, and over a smaller span the drift of a day looks like a slope
+# Over a smaller span of temperatures the drift of a day looks like a slope, and a thermometer errs by a degree.
 LEAST_SPAN_C = 5.0
-# standard deviations: the least of a slope, and the most of the points' distances from the line
+# In standard deviations: a smaller slope is not significant, and a point farther from the line contradicts it.
 LEAST_SLOPE_STD, MOST_LINE_STD = 3.0, 4.0
 DIGEST = "recording_digest"
 
@@ -55,7 +56,7 @@ def merge(calibrations: Sequence[Calibration]) -> MergeResult:
     all_ = [in_body_frame(c) for c in calibrations]
     T = np.array([c.sensor.temperature_c for c in all_], float)
     b_a, weight = np.array([c.b_a for c in all_]), np.array([c.b_a_std for c in all_]) ** -2.0
-    # the blob has one T_0 for the three axes
+    # One T_0 for the three axes, as the blob has only one.
     T_0 = float((weight.sum(1) * T).sum() / weight.sum())
     constant = (weight * b_a).sum(0) / weight.sum(0)
     line, line_std, slope, slope_std = _line(T - T_0, b_a, weight)
@@ -119,7 +120,7 @@ def _check(calibrations: Sequence[Calibration]) -> None:
 
 
 def _check_recordings(calibrations: Sequence[Calibration]) -> None:
-    """Check that no recording counts twice."""
+    """Raise RefusedError if several calibrations are from the same recording."""
     of = [_recordings(c) for c in calibrations]
     for i, one in enumerate(of):
         same = [i, *(k for k in range(i + 1, len(of)) if of[k] & one)]
@@ -141,9 +142,9 @@ def _is_sure(c: Calibration) -> bool:
 
 
 def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return b_a and slope at `away` = 0, (3,) each, each followed by its standard deviations.
+    """Fit b_a = b_a_0 + slope `away` by weighted least squares; return b_a_0 (3,), its std, slope (3,) and its std.
 
-    Weighted least squares of a straight line; without a span the slope is 0 and its deviation infinite.
+    away : (k,) C, T - T_0. If all are equal, the slope is 0 and its standard deviation infinite.
     """
     x = away[:, None]
     w, wx, wxx = (np.sum(weight * x**power, axis=0) for power in range(3))
@@ -156,11 +157,12 @@ def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Ve
 
 
 def _worst(residual: Vector, weight: Vector) -> float:
+    """Return the largest residual, in standard deviations."""
     return float(np.abs(residual * np.sqrt(weight)).max())
 
 
 def _objection(T: Vector, steepness: float, worst_line: float, worst_constant: float, count: int) -> str | None:
-    """Return the reason against a line; None if there is none."""
+    """Return the reason against b_a(T), as the end of a sentence; None if there is none."""
     if np.ptp(T) < LEAST_SPAN_C:
         return f"their temperatures span {np.ptp(T):.1f} °C, but {LEAST_SPAN_C:g} are needed."
     if worst_line > MOST_LINE_STD and count > 2:
@@ -174,7 +176,7 @@ def _objection(T: Vector, steepness: float, worst_line: float, worst_constant: f
 
 
 def _weighted_mean(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration:
-    """Return the merged calibration apart from its bias: weighted means, and a list of the calibrations."""
+    """Return the merged calibration except for its bias: D is a weighted mean, and `extra` lists the calibrations."""
     weight = np.array([c.D_std for c in all_]) ** -2.0
     D = (weight * np.array([c.D for c in all_])).sum(0) / weight.sum(0)
     parts: list[dict[str, Any]] = [
