@@ -1,6 +1,6 @@
 """Residuals of a calibration in a recording of rests and turns, and their Jacobian: r = J theta + noise.
 
-The errors of a calibration are theta, 23 numbers, those of D, b_a, K and b_omega in the body frame:
+theta are the 23 errors of a calibration in the body frame, those of D, b_a, K, b_omega and of the noise:
 
     E (9)       the accelerometer's matrix is D (I + E), row-major
     beta (3)    its bias is b_a + D beta [m/s^2]
@@ -8,9 +8,12 @@ The errors of a calibration are theta, 23 numbers, those of D, b_a, K and b_omeg
     delta (3)   its bias is b_omega + delta [rad/s]
     nu (2)      noise of the accelerometer and of the gyroscope, times e^nu
 
-A rest's calibrated mean is then a = s + E s + beta + noise, with s gravity's reaction. The residuals r are: |a| - g of
-each rest; the angle between a and gravity as carried by the gyroscope from the rest before; the mean rate of the first
-rest; and the logarithm of its noise, relative to the calibration's, unless a hand or a table shook it.
+The calibrated mean of a rest is then a = s + E s + beta + noise, with the true specific force s. The residuals r are:
+
+    |a| - g of each rest
+    the direction of a, as the angle (2 components) from that of the rest before, carried on by the gyroscope
+    the mean rate of the first rest less b_omega
+    the logarithm of the noise in the flat segment, relative to the calibration's, unless something shook the board
 """
 
 from __future__ import annotations
@@ -48,15 +51,17 @@ CALIBRATED, PARAMETERS = DELTA.stop, NOISE.stop
 # Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
 # 0.2 % of full scale).
 TURN_NONLINEARITY = 0.001
-# The variance of a rest is that of this number of block means: a tremor averages out within them, a sway does not.
+# The variance of a rest's mean follows from the variation of this number of block means: they are long enough for a
+# tremor to average out, but not for a sway.
 BLOCKS_A_REST = 4
-# A rest has few blocks: the mean variance of the other rests counts as this many degrees of freedom more.
+# A rest has few blocks, so its variance is pooled with that of the others, which counts as these degrees of freedom.
 POOLED_FREEDOM = 6.0
 # The flat rest and three more.
 LEAST_ORIENTATIONS = 4
-# Noise averages out in means over this time [s]; means of a board that is shaken vary more, by this factor.
+# The variance of means over this time [s] is that of n samples divided by n, if they are of noise. If it is larger by
+# more than this factor, the board is shaken.
 SHAKEN_S, MOST_SHAKEN_RATIO = 0.1, 4.0
-# Samples of a filtered stream are worth at least this share of independent ones.
+# Samples behind a low-pass filter are correlated: they count as at least this share of independent samples.
 LEAST_INDEPENDENT = 0.2
 
 
@@ -66,7 +71,7 @@ class Observations:
 
     Attributes
     ----------
-    r : (m,) m/s^2 of magnitudes, rad of angles, rad/s of the rate, logarithms of noise. J : (m, 23). R : (m, m).
+    r : (m,) magnitudes [m/s^2], angles [rad], rate [rad/s] and logarithms of noise. J : (m, 23). R : (m, m).
     down : (k, 3) unit vectors, calibrated: the direction that pointed down in each rest.
     temperature_c : mean of the chip's; None where it is not known. seconds : length of the recording.
     """
@@ -89,7 +94,7 @@ class Observations:
 
 
 def apply_errors(calibration: Calibration, theta: Vector) -> Calibration:
-    """Return the calibration of a sensor whose errors are theta (23,)."""
+    """Return the calibration corrected by its errors theta (23,)."""
     twist = np.zeros((3, 3))
     twist[UPPER] = theta[G]
     twist += np.triu(twist, 1).T
@@ -122,7 +127,8 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
     known = bool(np.isfinite(T).any())
     has_rates = bool(np.isfinite(recording.gyr).all())
     mended = remove_drift(recording, flat, found.bias_runs(runs)) if has_rates else recording
-    # A hand sways as it rests: its readings are carried to the middle of the rest, from where turns are compared.
+    # A hand sways as it rests. So the gyroscope turns each reading into the orientation in the middle of its rest, from
+    # which the turn to the next rest is computed.
     readings = [
         carried(mended, flat, calibration, slice(a, b), (b - a) // 2) if has_rates else mended.acc[a:b]
         for a, b in runs.tolist()
@@ -174,7 +180,10 @@ class _Rests:
 
 
 class _Residuals(NamedTuple):
-    """Residuals r (q,), their derivatives by the k means and by theta, and variance (q,) in addition to the means'."""
+    """Residuals r (q,), their derivatives J_rests (q, 3 k) by the k rests' means and J_theta (q, 23).
+
+    variance : (q,) in addition to what follows from the means.
+    """
 
     r: Vector
     J_rests: Vector
@@ -192,7 +201,7 @@ def _magnitudes(rests: _Rests, gravity: float) -> _Residuals:
 
 
 def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Residuals | None:
-    """Return the direction error of the turn to rest k; None if it clipped, or samples are missing."""
+    """Return the direction error of the turn to rest k; None if a rate was clipped, or samples are missing."""
     recording = rests.recording
     first, last = (rests.runs[k - 1 : k + 1].sum(1) // 2).tolist()
     between = slice(first, last + 1)
@@ -215,7 +224,7 @@ def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _
 
 
 def _of_theta(place: slice, r: Vector, variance: Vector, rests: _Rests) -> _Residuals:
-    """Return residuals that measure a part of theta; those that are not known are NaN, and left out."""
+    """Return residuals that are elements of theta themselves plus noise; unknown ones (NaN) are left out."""
     known = np.isfinite(r)
     return _Residuals(
         r[known], np.zeros((known.sum(), rests.a.size)), np.eye(PARAMETERS)[place][known], variance[known]
@@ -224,7 +233,7 @@ def _of_theta(place: slice, r: Vector, variance: Vector, rests: _Rests) -> _Resi
 
 def _noise_ratios(recording: Recording, flat: Flat, calibration: Calibration) -> Vector:
     """Return the logarithms (2,) of both sensors' noise, relative to the calibration's, as far as they are known."""
-    # At another rate, bandwidth and noise differ.
+    # At a different rate the bandwidth is different too, and with it the noise.
     same_rate = calibration.sensor.rate_hz == recording.sensor.rate_hz is not None
     ratios = np.full(2, np.nan)
     pairs = (recording.acc, calibration.noise_std), (recording.gyr, calibration.gyro_noise_std)
@@ -243,5 +252,5 @@ def _is_shaken(values: Vector, rate_hz: float) -> bool:
 
 
 def accelerometer_jacobian(a: Vector) -> Vector:
-    """Return the derivatives (3, 12) of E s + beta by E, row-major, and beta, at s = a."""
+    """Return the derivatives (3, 12) of E s + beta by the 12 numbers E (row-major) and beta, at s = a."""
     return np.hstack([np.kron(np.eye(3), a), np.eye(3)])
