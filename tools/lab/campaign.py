@@ -1,14 +1,15 @@
-"""Thousands of sessions with faults, and of damaged recordings, each judged against the simulated truth.
+"""Campaign of thousands of sessions with faults, and of damaged recordings, each judged against the simulated truth.
 
     python -m tools.lab campaign --sessions 1000
     python -m tools.lab campaign --recordings 10000
     python -m tools.lab campaign --case 739000123.4 --keep /tmp/faults
 
-Each session suffers one to four faults, drawn by the seed, of all kinds of campaign_worlds.py. It runs as a whole
-command, to its files and its exit code. Recordings are damaged as in campaign_recordings.py, and calibrated. A case is
-wrong with a good or usable calibration that is farther from the truth than it claims, a traceback, a hang, an exit code
-that does not fit, a failure without a sentence, or an incomplete file. A table counts verdicts by kind of fault; a
-wrong case comes with the command that repeats it. Seeds begin with the day's number. Exit code 1: a case was wrong.
+Each session has one to four faults, drawn by the seed, of the kinds in campaign_worlds.py. It runs as a whole command,
+to its files and its exit code. A recording is damaged as in campaign_recordings.py, and calibrated. A case is wrong if
+a good or usable calibration is farther from the truth than it claims, if there is a traceback, a hang, an exit code
+that does not fit or a failure without a sentence, or if a file is incomplete. A table counts the verdicts by kind of
+fault. Each wrong case is printed with the command that repeats it. The seeds begin with the day's number. Exit code 1
+means that a case was wrong.
 """
 
 import os
@@ -32,7 +33,7 @@ from .judge import MOST_CLAIMS
 from .runner import Trial
 from .table import VERDICTS, Column, Row, count, over, show, table
 
-CASES = 16
+CASES = 16  # cases, which differ in their faults, of each undisturbed session
 # targets of sessions: how often each comes, and the last time [s] at which faults begin; a lower target ends sooner
 TARGETS = (*("quick",) * 7, "normal")
 LAST_S = {"quick": 50.0, "normal": 66.0}
@@ -40,16 +41,16 @@ CHIPS = ("mpu6050", "mpu6500", "clone98")
 HANDS = (*("guided",) * 6, "wandering", "placing", "random")
 RATES = (50, 25, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
-# left where the first fault begins
+# file that is made when the first fault begins
 BEGUN = Path("begun")
 # one session in this many draws the pictures of its report
 PICTURES = 8
-# the chip alone is cheapest, and comes most often
+# a chip without bridge or vehicle takes least time, and comes most often
 WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 
 
 class Case(NamedTuple):
-    """Session with faults: `number` of the undisturbed one, `k` of the case, and the faults, the earliest first."""
+    """Session with faults, the earliest first; `number` determines the session, and `k` with it the faults."""
 
     number: int
     k: int
@@ -70,8 +71,8 @@ def drawn(number: int, k: int) -> Case:
     return Case(number, k, tuple(sorted(faults, key=lambda fault: fault.at_s)))
 
 
-def words(number: int) -> list[str]:
-    """Return the command of a session."""
+def command_of(number: int) -> list[str]:
+    """Return the command line of a session."""
     world, target = kind_of(number)
     to = ["--to", "chip"] if number % 3 == 0 else []
     if world == VEHICLE:
@@ -93,7 +94,7 @@ def run_with_faults(case: Case, world: World) -> int:
     os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
     world.at(case.faults[0].at_s, begin)
     with world.opened(), quick(), without_pictures() if case.k % PICTURES else nullcontext():
-        return run(words(case.number))
+        return run(command_of(case.number))
 
 
 def of_session(case: Case, here: Path) -> Row:
@@ -139,7 +140,7 @@ def scenarios(
 
 
 def line(row: Row) -> str:
-    """Return what was wrong with the command that repeats it; empty if nothing was."""
+    """Return how a wrong case ended, what was wrong, and the command that repeats it; empty if nothing was wrong."""
     again = f"python -m tools.lab campaign --case {row.case} --keep /tmp/faults"
     return "\n".join([shown(row), *(f"    WRONG {wrong}: {again}" for wrong in row.wrong)]) if row.wrong else ""
 
@@ -167,7 +168,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def report(found: list[Row]) -> int:
-    """Print by kind of fault, alone or with others, the exits and the largest error of those that were not refused."""
+    """Print a table by kind of fault; a case with several faults counts in each row. Return 1 if a case was wrong."""
     with_faults, kinds = [row for row in found if row.faults], dict[tuple[str, str], list[Row]]()
     for row in with_faults:
         for name in {fault.partition("@")[0] for fault in row.faults}:
