@@ -89,10 +89,10 @@ def find_sensitivity(
             return None
     left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
     assert found.to_ends is not None
-    # The gyroscope's bias may change besides.
+    # The gyroscope's bias may change besides; where nothing is likely without S, nothing is with it.
     scores = part_scores(less, before, SENSITIVE, found.to_ends).moved(step)
     parts = with_times(less, theta, scores, H, np.zeros(SENSITIVE))
-    beside = rank(parts, theta.D)
+    beside = rank(parts, theta.D) if others > np.log(SURE) else explanations
     evidence += np.logaddexp.reduce([0.0, *(each.log_share for each in beside)])
     change = gyroscope_change(beside)
     if change is not None:
