@@ -73,7 +73,7 @@ class Evidence:
         return self.changed is None or self.first > 0
 
     @property
-    def rest(self) -> Flat:
+    def flat_segment(self) -> Flat:
         """Flat segment, for callers that know that there is one."""
         assert self.flat is not None
         return self.flat
@@ -106,7 +106,7 @@ class Evidence:
     @cached_property
     def rests(self) -> Intervals:
         """Typical rests (k, 2), first and last + 1 of their samples; there must be a flat segment."""
-        return RestFinder(self.recording, self.rest).typical()
+        return RestFinder(self.recording, self.flat_segment).typical()
 
     @cached_property
     def was_held_all_around(self) -> bool:
@@ -206,7 +206,7 @@ class Evidence:
         u = units(statistics(self.recording.acc, self.rests)[0])
         between = np.stack([self.rests[:-1, 1], self.rests[1:, 0]], axis=1)
         whole = np.array([k for k in self._far_turns if not self._is_interrupted(*between[k] - (1, 0))], np.intp)
-        return self._turns(self.rest, u[whole], u[whole + 1], between[whole])
+        return self._turns(self.flat_segment, u[whole], u[whole + 1], between[whole])
 
     @cached_property
     def _far_turns(self) -> list[int]:

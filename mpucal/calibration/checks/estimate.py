@@ -171,5 +171,5 @@ def _is_disturbed(e: Evidence) -> bool:
 
 def _since_the_start(e: Evidence, span: tuple[float, float]) -> tuple[float, float]:
     """Return times after the flat segment as times since the recording's start [s]."""
-    begin = float(e.recording.t[e.rest.last - 1] - e.recording.t[0])
+    begin = float(e.recording.t[e.flat_segment.last - 1] - e.recording.t[0])
     return begin + span[0], begin + span[1]

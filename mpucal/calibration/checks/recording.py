@@ -25,10 +25,10 @@ SEPARABLE_HZ = 48.0
 
 def moved_while_still(e: Evidence) -> Reason | None:
     """Find a board that moved in the flat segment that the caller named."""
-    half = e.rest.n // 2
+    half = e.flat_segment.n // 2
     if half < 2:
         return None
-    acc = e.recording.acc[e.rest.first : e.rest.first + 2 * half].reshape(2, half, 3)
+    acc = e.recording.acc[e.flat_segment.first : e.flat_segment.first + 2 * half].reshape(2, half, 3)
     moved = np.abs(acc[1].mean(0) - acc[0].mean(0))
     if (moved <= 0.1 + 6.0 * np.sqrt(2.0 * acc.var(1).min(0) / half)).all():
         return None
@@ -108,14 +108,14 @@ def vibrating(e: Evidence) -> Reason | None:
     """Find vibration, as of a motor that runs from the start or from later on."""
     std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
     least = NOISIEST_ACC_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
-    share = float(np.mean(std > np.maximum(least, TIMES_NOISE * np.sqrt(e.rest.Sigma_a.mean()))))
-    at_rest = float(np.median(std[e.rest.first : e.rest.last]))
+    share = float(np.mean(std > np.maximum(least, TIMES_NOISE * np.sqrt(e.flat_segment.Sigma_a.mean()))))
+    at_rest = float(np.median(std[e.flat_segment.first : e.flat_segment.last]))
     if share < MOST_SPOILT and at_rest < NOISIEST_ACC_MPS2:
         return None
     return reason(
         "vibrating",
         "noise",
-        std=float(np.median(std[e.rest.last :])),
+        std=float(np.median(std[e.flat_segment.last :])),
         share=max(share, float(at_rest > NOISIEST_ACC_MPS2)),
     )
 

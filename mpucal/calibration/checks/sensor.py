@@ -76,7 +76,7 @@ def _reads_up(e: Evidence, M: Vector) -> bool:
 
     Where it lay on another side, return True for the M that changes fewer signs.
     """
-    flat = M.T @ e.rest.y
+    flat = M.T @ e.flat_segment.y
     return bool(flat[2] > 0.0) if np.abs(flat).argmax() == 2 else bool(np.trace(M) > 0.0)
 
 

@@ -80,7 +80,7 @@ def same_magnitude(e: Evidence) -> Reason | None:
 
 def two_sensors(e: Evidence) -> Reason | None:
     """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest."""
-    at_rest = slice(e.rest.first, e.rest.last)
+    at_rest = slice(e.flat_segment.first, e.flat_segment.last)
     readings = np.hstack([e.recording.acc[at_rest], e.recording.gyr[at_rest]])
     size = len(readings) // (2 * FEWEST_SAMPLES)
     if not size:
@@ -121,7 +121,7 @@ def never_still(e: Evidence) -> Reason | None:
 
 def hardly_turned(e: Evidence) -> Reason | None:
     """Find a board that was not turned after it lay flat, or whose gravity does not follow it."""
-    after = len(e.recording) - e.rest.last
+    after = len(e.recording) - e.flat_segment.last
     if _rested_late(e):
         return None
     if e.gravity_moved >= LEAST_TURN_RAD and after >= FEWEST_SAMPLES:
@@ -134,7 +134,7 @@ def hardly_turned(e: Evidence) -> Reason | None:
 
 def _seconds_before(e: Evidence) -> float:
     """Return the time [s] before the flat segment."""
-    return float(e.recording.t[e.rest.first] - e.recording.t[0])
+    return float(e.recording.t[e.flat_segment.first] - e.recording.t[0])
 
 
 def _rested_late(e: Evidence) -> bool:
@@ -146,10 +146,10 @@ def _rested_late(e: Evidence) -> bool:
 @once
 def dead_accelerometer(e: Evidence) -> Reason | None:
     """Find an axis of the accelerometer that is constant, throughout or for seconds while the others show a turn."""
-    axes = _constant_axes(e, e.recording.acc, e.rest.Sigma_a, QUIETEST_ACC_MPS2)
+    axes = _constant_axes(e, e.recording.acc, e.flat_segment.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
         return reason("bits_stuck", "constant", axes=axes)
-    if np.sqrt(e.rest.Sigma_a).max() <= QUIETEST_ACC_MPS2 or not (stuck := stuck_readings(e.recording, "acc")):
+    if np.sqrt(e.flat_segment.Sigma_a).max() <= QUIETEST_ACC_MPS2 or not (stuck := stuck_readings(e.recording, "acc")):
         return None  # data that are computed repeat
     (axis, first, last), t = stuck[0], e.recording.t - e.recording.t[0]
     return reason("bits_stuck", "frozen", axis="xyz"[axis], begin=float(t[first - 1]), end=float(t[last - 2]))
@@ -158,7 +158,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
 @once
 def dead_gyroscope(e: Evidence) -> Reason | None:
     """Find an axis of the gyroscope that is constant throughout."""
-    axes = _constant_axes(e, e.recording.gyr, e.rest.Sigma_omega, QUIETEST_GYRO_RAD_S)
+    axes = _constant_axes(e, e.recording.gyr, e.flat_segment.Sigma_omega, QUIETEST_GYRO_RAD_S)
     return reason("gyro_off", "constant", axes=axes) if axes else None
 
 
