@@ -128,7 +128,7 @@ class _Scales:
 
     @cached_property
     def fine(self) -> Preprocessed:
-        """All samples."""
+        """Samples of the whole recording, each by itself."""
         at = self.flat.first, self.flat.last
         return prepare(self._without_drift, at, self._runs, self.gravity, self._noise_factor)
 
