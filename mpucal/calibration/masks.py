@@ -15,7 +15,7 @@ from ..rests.intervals import true_runs
 from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .problem import Series
-from .rotation import cross_rows, lengths, shortest_turn, units
+from .rotation import cross_rows, lengths, shortest_turns, units
 from .words import ODDS
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
@@ -154,10 +154,12 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     # Nothing is known of the rate in a long gap: it counts as zero.
     omega = np.where(gap[:, None], np.where(np.isnan(rates[last:]), flat.b_omega, rates[last:]), series.omega)
     up = units(recording.acc[last - 1 :])
-    for i in np.flatnonzero(q_extra > LOST_RAD**2):
-        q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
-        if up[i].any() and up[i + 1].any():  # gravity shows the turn, for which a linear correction may be too large
-            omega[i] = flat.b_omega - shortest_turn(up[i], up[i + 1]) / series.dt[i]
+    lost = np.flatnonzero(q_extra > LOST_RAD**2)
+    for settling in range(1, SETTLING + 1):
+        q_extra[lost[lost < len(q_extra) - settling] + settling] += LOST_RAD**2
+    # gravity shows the turn, for which a linear correction may be too large
+    shown = lost[up[lost].any(axis=1) & up[lost + 1].any(axis=1)]
+    omega[shown] = flat.b_omega - shortest_turns(up[shown], up[shown + 1]) / series.dt[shown, None]
     q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
 

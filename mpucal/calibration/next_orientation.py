@@ -20,7 +20,7 @@ from .parameters import ACCELEROMETER, HAND, PLACES
 from .poses import POSE_MPS2
 from .preprocessing import CORRELATION_S, jerk_density
 from .problem import Problem, Series
-from .rotation import cross_rows, lengths, shortest_turn
+from .rotation import cross_rows, lengths, shortest_turns
 
 # These describe how a person turns the board to an orientation, and holds it there.
 MOVE_S, REST_S = 1.6, 2.0
@@ -71,7 +71,7 @@ def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: Vecto
     problem, theta = known.problem, known.theta
     dt = float(np.median(problem.series.dt))
     rest, moves = max(round(REST_S / dt), 2), np.maximum(np.rint(seconds / dt).astype(np.intp), 2)
-    turns = np.array([shortest_turn(s / np.linalg.norm(s), -down) for down in directions])
+    turns = shortest_turns(np.broadcast_to(s / np.linalg.norm(s), directions.shape), -directions)
     angle = lengths(turns)
     # In the body's axes, s turns against the body, in the plane perpendicular to the turn.
     across = cross_rows(turns / angle[:, None], s)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..calibration.rotation import shortest_turn
+from ..calibration.rotation import shortest_turns
 from ..data import Vector
 from ..mavlink.texts import Prompt
 from . import rotation
@@ -164,7 +164,7 @@ class Hand:
     def turn_to(self, now: Stance, down: Vector, twist_rad: float = 0.0) -> Vector:
         """Return the rotation vector (3,) [rad] that points `down` (3,) down, with a twist about the vertical."""
         up = -down / np.linalg.norm(down)
-        tilt = -shortest_turn(rotation.up_in_board(now.attitude), up)
+        (tilt,) = -shortest_turns(rotation.up_in_board(now.attitude)[None], up[None])
         return rotation.log(rotation.product(rotation.exp(tilt), rotation.exp(up * twist_rad)))
 
     def inaccurate(self, down: Vector) -> Vector:

@@ -1,12 +1,10 @@
 """Estimator for a board that was only tilted: right within the tilts, and uncertain elsewhere."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
-from mpucal.calibration.rotation import shortest_turn
+from mpucal.calibration.rotation import shortest_turns
 from mpucal.calibration.tilt import BIAS_SD_MPS2, D_SD, fit_tilt
 from mpucal.rests.flat import flat_statistics
 from tools.lab.scenarios.course import Leg, along
@@ -18,7 +16,7 @@ from tools.lab.scenarios.table import STEADY
 SIDES = np.arange(8) * 2.0 * np.pi * 3 / 8
 TILTED = np.stack([0.5 * np.cos(SIDES), 0.5 * np.sin(SIDES), np.full(8, np.sqrt(0.75))], axis=1)
 UPS = np.vstack([[0.0, 0.0, 1.0], TILTED])
-LEGS = [Leg(shortest_turn(after, before), 1.6, 2.0) for before, after in pairwise(UPS)]
+LEGS = [Leg(turn, 1.6, 2.0) for turn in shortest_turns(UPS[1:], UPS[:-1])]
 BOARD = Family(
     "tilted",
     motion=lambda step_s, rng: along(LEGS, step_s),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.calibration.rotation import shortest_turn
+from mpucal.calibration.rotation import shortest_turns
 from mpucal.simulated import rotation
 from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
@@ -73,8 +73,8 @@ def test_an_arm_sways_and_trembles_as_much_as_it_says():
     ids=["the same", "opposite", "opposite x", "across"],
 )
 def test_the_shortest_turn(a, b):
-    a, b = np.array(a), np.array(b)
-    turn = shortest_turn(a, b)
+    a, b = np.array([a, b], float)
+    (turn,) = shortest_turns(a[None], b[None])
     np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
     assert np.linalg.norm(turn) == pytest.approx(np.arccos(a @ b), abs=1e-7)
 

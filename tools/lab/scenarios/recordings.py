@@ -6,11 +6,10 @@ A motion gives the board's turns on a clock of steps, as in course.py.
 import math
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
-from mpucal.calibration.rotation import shortest_turn
+from mpucal.calibration.rotation import shortest_turns
 from mpucal.data import Recording, Sensor, Vector
 from mpucal.rests.flat import Flat, flat_statistics
 from mpucal.simulated import rotation
@@ -57,7 +56,7 @@ def three_orientations(step_s: float, rng: Rng) -> Course:
 def as_asked(step_s: float, rng: Rng) -> Course:
     """Draw the three that a check asks for, each missed by some degrees: two edges of a box, and one across both."""
     up = np.array([[0, 0, 1], [1, 1, 0], [-1, 1, 0], [0, -1, -1]]) / np.sqrt([[1], [2], [2], [2]])
-    turns = np.array([shortest_turn(after, before) for before, after in pairwise(up)])
+    turns = shortest_turns(up[1:], up[:-1])
     return evenly(turns + rng.uniform(-SLOPPY_RAD, SLOPPY_RAD, (3, 3)), 1.6, step_s, CHECK_S)
 
 
