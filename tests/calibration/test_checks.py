@@ -11,7 +11,7 @@ from mpucal.calibration import calibrate, estimate, paper
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
-from mpucal.data import Recording
+from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.result.calibration import Calibration
 from tools.lab.scenarios.recordings import paper_scenario
 
@@ -326,6 +326,16 @@ def test_an_accelerometer_that_dies_is_refused_and_its_calibration_can_be_read(a
 def test_an_axis_that_repeats_for_a_second_or_at_rest_is_not_stuck(in_hand):
     for rows in (slice(1900, 2050), slice(0, 900)):
         assert "bits_stuck" not in judged(changed(put(rows, 2, None))(in_hand.recording))[1]
+
+
+def test_a_bit_that_a_hum_passes_over_as_a_recording_ends_is_not_stuck(in_hand):
+    """Swing at half the sample rate by 256 counts, from one word with bit 7 to the next."""
+    counts = np.rint(in_hand.recording.acc * 16384.0 / STANDARD_GRAVITY_MPS2).astype(int)
+    swing = 192 + 256 * (counts[-60:, 0] // 256)
+    swing[1::2] += 256
+    counts[-60:, 0] = swing
+    acc = counts / 16384.0 * STANDARD_GRAVITY_MPS2
+    assert "bits_stuck" not in judged(replace(in_hand.recording, acc=acc))[1]
 
 
 def test_one_turn_leaves_the_axis_of_the_turn_unknown(bases):

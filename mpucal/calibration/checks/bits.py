@@ -19,6 +19,7 @@ from ..evidence import Evidence
 from ..scores import MOST_PARTS
 from ..words import ODDS, Counts, Words
 from .estimate import GOOD_RMS_MPS2
+from .recording import MOST_SPOILT
 from .unusable import dead_accelerometer, dead_gyroscope
 
 # Share of the changes in which a stuck bit changes, by errors, and most share of a sound one.
@@ -85,8 +86,9 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
 
     Across a gap, as between files of single faces, nothing changes.
     """
-    # Bits may die midway: they are counted in parts.
-    edges = np.unique(np.linspace(0, len(counts) - 1, MOST_PARTS, endpoint=False).astype(np.int64))
+    # Bits may die midway: they are counted in parts. So late that little is spoilt, a swing may leave a bit unchanged.
+    last = (1.0 - MOST_SPOILT) * len(counts)
+    edges = np.unique(np.linspace(0, last, MOST_PARTS, endpoint=False).astype(np.int64))
     evidence = _kernel.stuck_odds(counts, gap, edges, ERRORS, SOUND)
     # of all parts from one on
     after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
