@@ -84,10 +84,11 @@ for line in sys.stdin:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with two calibrations, and with the modules of all recipes."""
+    """A folder with calibrations, and with the modules of all recipes."""
     folder = tmp_path_factory.mktemp("followed")
     made = Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5]))
     made.save(folder / "c.json")
+    replace(made, applied_in_hardware=np.array([0.25, 0.0, 0.0])).save(folder / "in_chip.json")
     replace(made, quality={"verdict": "refused"}).save(folder / "refused.json")
     titles = ("A sink", "A source", "A source of samples", "An export form", "A reader", "A chip")
     recipes = [RECIPES[title] for title in titles]
@@ -166,12 +167,12 @@ def test_a_source_of_samples(call, port):
 
 
 def test_an_export_form(call, folder):
-    call("export", "c.json", "--to", "octave", "-o", "c.m")
+    call("export", "in_chip.json", "--to", "octave", "-o", "c.m")
     script = (folder / "c.m").read_text()
     D, b_a = (re.search(rf"^{name} = \[(.*)\]", script, re.MULTILINE).group(1) for name in ("D", "b_a"))
     np.testing.assert_array_equal(np.array([row.split() for row in D.split(";")], float), np.diag([1.1, 1.0, 0.9]))
-    assert json.loads(f"[{b_a}]") == [0.5, 0.0, -0.5]
-    document = json.loads(call("export", "c.json", "--to", "octave", "--json"))
+    assert json.loads(f"[{b_a}]") == [0.25, 0.0, -0.5]
+    document = json.loads(call("export", "in_chip.json", "--to", "octave", "--json"))
     assert (document["to"], document["ending"], document["text"]) == ("octave", ".m", script)
     assert any("does not correct the gyroscope" in note for note in document["cannot_carry"])
     assert re.search(r"octave +Octave, MATLAB", call("export", "--help"))
