@@ -328,6 +328,16 @@ def test_an_axis_that_repeats_for_a_second_or_at_rest_is_not_stuck(in_hand):
         assert "bits_stuck" not in judged(changed(put(rows, 2, None))(in_hand.recording))[1]
 
 
+def test_a_hand_that_trembles_as_it_turns_a_board_is_no_motor(in_hand):
+    """Tremble at 12 Hz, of which a recording of 50 Hz has four samples a period."""
+    r = in_hand.recording
+    t, acc, gyr = (values[::2] for values in (r.t, r.acc, r.gyr))
+    turns = np.linalg.norm(gyr - gyr[:400].mean(axis=0), axis=1) > 0.3
+    trembles = np.convolve(turns, np.ones(35), "same") > 0
+    tremor = 1.2 * np.where(trembles, np.sin(24.0 * np.pi * t), 0.0)
+    assert judged(Recording.from_arrays(t, acc + tremor[:, None] * [0.6, 0.6, 0.5], gyr)) == ("good", {})
+
+
 def test_a_bit_that_a_hum_passes_over_as_a_recording_ends_is_not_stuck(in_hand):
     """Swing at half the sample rate by 256 counts, from one word with bit 7 to the next."""
     counts = np.rint(in_hand.recording.acc * 16384.0 / STANDARD_GRAVITY_MPS2).astype(int)

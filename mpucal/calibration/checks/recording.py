@@ -20,7 +20,7 @@ INTERRUPTED_S = 10.0
 # The accelerometer's noise is vibration where it exceeds VIBRATING_MPS2 and TIMES_NOISE that of the flat segment for
 # MOST_SPOILT of the time, or where it is at rest more than that of any sensor. Below this rate, fourth differences do
 # not separate a tremor of up to 12 Hz from noise: only what is larger than the noise of any sensor is vibration.
-SEPARABLE_HZ = 48.0
+SEPARABLE_HZ = 60.0
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
