@@ -68,7 +68,7 @@ class Directions:
 
 
 class Coverage:
-    """Orientations that the board has paused in, passed, and rested in, long or short."""
+    """Orientations in which the board has paused or rested (a rest may be shorter), and those that it has passed."""
 
     def __init__(self) -> None:
         self.paused, self.passed, self.rested = Directions(), Directions(), Directions(SAME_RAD)
@@ -133,13 +133,14 @@ AIMS: Mapping[str, Aim] = {
     NORMAL: Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
     BEST: Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
-# Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up. Each is
-# a quarter turn from the one before, about another axis. They determine best what a vehicle's parameters hold: biases
-# and scale factors. The last direction is tilted: with the gyroscope it gives the angles between the axes. One new
-# orientation verifies a first calibration that is good. One with reservations may come from a slip: it is verified by
-# as many orientations as the quickest calibration of a board.
+# Directions that point down as a vehicle lies on its sides: level, left side, nose down, back, right side, nose up.
+# Each is a quarter turn from the one before, about a different axis. They determine biases and scale factors best, and
+# a vehicle's parameters hold no more. The last direction is tilted: with the gyroscope it gives the angles between the
+# axes.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
+# One new orientation verifies a first calibration that is good. If its verdict is only usable, a slip may be the
+# reason, and as many orientations are needed as for the quickest calibration of a board.
 VERIFY_GOOD = 1
 
 
@@ -149,10 +150,10 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
     of_board = aim.target
-    # Its parameters hold no angles between the axes: they need only be known well enough for the biases.
+    # A vehicle's parameters hold no angles between the axes, which need only be known well enough for the biases.
     std = Target(of_board.gain_pct, 6.0 * of_board.misalignment_deg, 0.7 * of_board.bias_mg)
     aim = aim._replace(target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
-    # The best target may take a board's time.
+    # The best target takes as many orientations as that of a board.
     return aim if target == BEST else aim._replace(least=len(SIDES), verify=VERIFY_GOOD)
 
 

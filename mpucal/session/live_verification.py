@@ -22,9 +22,9 @@ from ..result.keys import Quality
 from .events import Checked, Verification, triple
 from .rotate import REST_S
 
-# A shorter turn shows too little of a scale factor error to find one by it.
+# A shorter turn is too little changed by a scale factor error to show one.
 LONG_TURN_RAD = np.deg2rad(40.0)
-# A first calibration is not of a chip whose temperature has changed by more since it lay flat.
+# If the temperature has changed by more since the board lay flat, the first calibration does not hold any more.
 MOST_CHANGE_C = 8.0
 # The reason that more orientations remove, and the reasons beside which they do not help.
 FEW = "few_orientations"
@@ -62,8 +62,8 @@ def judge_verification(
 ) -> Checked:
     """Return whether the rests agree with the first calibration, and the likeliest reason where they do not.
 
-    A calibration that nothing speaks against is not verified either if fewer than `of` orientations are unseen, or if
-    they could not have shown an error for which a calibration is refused.
+    Where they agree, the calibration may still not be verified: fewer than `of` orientations are unseen, or they could
+    not have shown an error for which a calibration is refused.
 
     Parameters
     ----------

@@ -124,8 +124,8 @@ TURN_WORDS = (
 ROUND_DEG = 5.0
 # A heading is kept as long as it leads this near to the wanted orientation.
 KEPT_RAD = math.radians(10.0)
-# The words are kept as long as the heading differs from theirs by no more than this; up to a right angle, the shortest
-# one: a turn of 25 deg by words that are 60 deg off would leave 25 deg.
+# The words are kept as long as the heading differs from theirs by no more than this. For turns of less than a right
+# angle that is the shortest heading: after a turn of 25 deg in a direction that is 60 deg off, 25 deg would remain.
 WORDS_KEPT_RAD = math.radians(30.0)
 # From one call to the next the wanted attitude turns about the vertical by no more than this.
 SLEW_RAD = math.radians(15.0)
@@ -145,8 +145,8 @@ NO_TURN = Turn()
 class TurnGuide:
     """Guide to one orientation after another.
 
-    The guide keeps to the heading that it has chosen. For a board that is nearly upside down every heading is about as
-    short, and each tremor makes another one the shortest.
+    The guide keeps the heading that it has chosen. Where nearly half a turn is missing, all headings are about equally
+    short, and each tremor would make another one the shortest.
     """
 
     def __init__(self) -> None:
@@ -177,7 +177,7 @@ class TurnGuide:
     def _update_heading(self, shortest: float, missing: float, new: bool) -> None:
         """Change the heading no more than is needed to end within KEPT_RAD of the wanted orientation."""
         if new:
-            # Upside down, any heading will do: one of the four simple ones is easy to follow.
+            # For half a turn any heading will do, and one of the four simple ones is easy to follow.
             simple = missing > math.pi - KEPT_RAD
             self._heading = _angle(2 * round(shortest / (math.pi / 2.0)) if simple else _nearest(shortest))
         aside = _wrapped(self._heading - shortest)

@@ -60,7 +60,8 @@ class Step:
 
 # Length of a window for the rests of a hand, which are short.
 HAND_WINDOW_S = 0.25
-# From the prompt for the next orientation until a person moves there is another second of stillness.
+# Time for which an orientation is held. It is followed by another second of stillness, until the person moves after the
+# next prompt.
 HOLD_S = 1.25
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
@@ -78,7 +79,7 @@ USE_TEXTS = {
 
 
 class Pause(NamedTuple):
-    """The board has been still in one orientation for `seconds`, in the stillness number `run`.
+    """Pause in one orientation, which has lasted for `seconds`; `run` is the number of the still run, see Still.
 
     Attributes
     ----------
@@ -155,7 +156,7 @@ class PoseStep(Step):
 
 
 class PauseDetector:
-    """Detector of pauses; the stillness in which it begins does not count.
+    """Detector of pauses; a still run that has begun before the detector does not count.
 
     Parameters
     ----------
@@ -167,11 +168,11 @@ class PauseDetector:
         self._last_run: int | None = None
 
     def leave(self, run: int) -> None:
-        """Ignore the stillness number `run` from now on."""
+        """Ignore the still run of this number from now on."""
         self._last_run = run
 
     def add(self, sightings: Sequence[Sighting]) -> list[Pause]:
-        """Return the pauses in windows, one for each window of stillness."""
+        """Return the state of the pause after each still window."""
         pauses: list[Pause] = []
         for window, sight in sightings:
             if self._last_run is None:
