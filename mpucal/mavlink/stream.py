@@ -15,17 +15,19 @@ from .requests import encode_command, interval_command, send_command
 
 # ArduPilot's rates at a loop of 400 Hz: the next lower one is requested after one that it denies.
 LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
-# Over a slow radio the first messages come late.
-ARRIVE_NS, ENOUGH, RATE_NS = 3 * S, 3, S
+# A stream is there if so many messages come within ARRIVE_NS: over a slow radio the first ones come late. Its rate is
+# measured over RATE_NS.
+ARRIVE_NS, FEWEST_MESSAGES, RATE_NS = 3 * S, 3, S
 ACK_S, ACK_TRIES = 0.7, 4
 OTHER_IMUS = ("SCALED_IMU2", "SCALED_IMU3")
 
-# HIGHRES_IMU is in no stream group, and PX4 has no groups: a station that lowers it requests it by name.
+# Remedies, if another station lowers a stream. --streamrate is of stream groups. HIGHRES_IMU is in none, and PX4 has no
+# groups: a station that lowers these requests them by name.
 STREAMRATE, STOP_IT = "start MAVProxy with --streamrate=-1", "stop that one"
 # PX4 sends everything less often when a link's bandwidth is used up.
 TOO_MUCH = ", or its link is too slow for that (MAV_0_RATE and the like; give a lower --rate)"
-# If less than MOST of the requested rate comes of a PX4, SOONER times that rate is requested.
-MOST, SOONER = 0.8, 2.0
+# A stream is slow below this share of the requested rate. Of a PX4 then this multiple of the rate is requested.
+SLOW_SHARE, PX4_MULTIPLE = 0.8, 2.0
 
 WATCH_NS = 2 * S
 FALLEN = 0.6
@@ -69,10 +71,10 @@ class Streams:
             self._request_and_wait(name)
         self._takes_temperature = first.name == HIGHRES and not self._is_px4
         self._request_temperature()
-        if self._measure_hz(first) < MOST * self._rate_hz and self._is_px4:
+        if self._measure_hz(first) < SLOW_SHARE * self._rate_hz and self._is_px4:
             # PX4 omits samples that come before the interval is over: it sends 125 Hz of 250 if 200 are requested.
             for name in self._requested_hz:
-                self._requested_hz[name] = SOONER * self._rate_hz
+                self._requested_hz[name] = PX4_MULTIPLE * self._rate_hz
                 self._request(name)
             list(self._link.messages(self._link.now_ns() + RATE_NS))
         self._restart_window()
@@ -96,7 +98,7 @@ class Streams:
                 self._fallen.append(stream)
         for stream, rate_hz in rates.items():
             best_hz = max(rate_hz, self._best_hz.get(stream, 0.0))
-            # A burst of what a link held back is faster than any stream.
+            # A link may send at once what it held back, and then the stream seems faster than it was requested.
             self._best_hz[stream] = min(best_hz, self._requested_hz.get(stream.name, best_hz))
 
     def request_again(self) -> None:
@@ -141,7 +143,7 @@ class Streams:
             self._requested_hz[name] = rate_hz
             result = send_command(self._link, *self._interval_command(name), timeout_s=ACK_S, tries=ACK_TRIES)
             if result != m.MAV_RESULT_DENIED:
-                # No answer at all may be a lost one: the messages that arrive show it.
+                # Without an answer the request may have been accepted; the messages that arrive will show it.
                 return result in (m.MAV_RESULT_ACCEPTED, None)
         return False
 
@@ -155,7 +157,7 @@ class Streams:
         """Wait for IMU 1's messages of that name; return True once enough came."""
         self._times.clear()
         until_ns = self._link.now_ns() + ARRIVE_NS
-        return any(len(self._times[Stream(name, 1)]) >= ENOUGH for _ in self._link.messages(until_ns))
+        return any(len(self._times[Stream(name, 1)]) >= FEWEST_MESSAGES for _ in self._link.messages(until_ns))
 
     def _measure_hz(self, stream: Stream) -> float:
         self._times.clear()
@@ -169,7 +171,7 @@ class Streams:
         return best_hz if best_hz >= FALLEN * fastest_hz else min(self._requested_hz[stream.name], fastest_hz)
 
     def _report_fallen(self, rates: Mapping[Stream, float]) -> None:
-        """Say that a stream had fallen which still comes: nobody slowed a vehicle that fell silent."""
+        """Say that a stream had become slow, unless it stopped: then no other station slowed it."""
         alive = [stream for stream in self._fallen if rates.get(stream)]
         self._fallen = []
         now_ns = self._link.now_ns()
@@ -187,11 +189,11 @@ class Streams:
         )
 
     def _report_rates(self, rates: Mapping[Stream, float]) -> None:
-        """Say at first which streams the vehicle sends slower than requested."""
+        """Say which streams the vehicle sends slower than requested, in the first window."""
         slow = [
             f"{s.name} at {hz:.0f} Hz"
             for s, hz in rates.items()
-            if s.name in self._requested_hz and hz < MOST * self._rate_hz
+            if s.name in self._requested_hz and hz < SLOW_SHARE * self._rate_hz
         ]
         if slow:
             self._say(f"{self._rate_hz:.0f} Hz were asked for; the vehicle sends {', '.join(slow)}.")
@@ -213,4 +215,4 @@ class Streams:
 def _rate_hz(stream: Stream, times: Collection[int], seconds: float) -> float:
     """Return a stream's rate by its own clock, which a burst or a busy vehicle does not change."""
     span_us = (max(times) - min(times)) * stream.unit_us
-    return (len(times) - 1) * 1e6 / span_us if len(times) > ENOUGH else len(times) / seconds
+    return (len(times) - 1) * 1e6 / span_us if len(times) > FEWEST_MESSAGES else len(times) / seconds

@@ -21,7 +21,7 @@ from ..mavlink.parameters.client import read_parameters, read_stream_parameters
 from ..mavlink.parameters.mounting import BOARD_ROTATION, ORIENTATION, mounting, trim_names, trim_of
 from ..mavlink.parameters.slots import Slot, Values, find_slot
 from ..mavlink.requests import ask, check_prearm, encode_command, is_armed
-from ..mavlink.stream import MOST, Streams
+from ..mavlink.stream import SLOW_SHARE, Streams
 from ..mavlink.vehicle_source import LOSS_SHARE
 from ..rests.flat import flat_statistics
 from ..result.error_model import MG_PER_MPS2
@@ -149,7 +149,7 @@ def _imu(recording: Recording, asked_hz: float) -> Iterator[Finding]:
     data = {"message": of.message, "rate_hz": hz, "asked_hz": asked_hz, "gaps": gaps}
     what = f"{of.message} at {hz:.0f} Hz" + (f", with {gaps} gap{'s' if gaps > 1 else ''}" if gaps else "")
     remedy = "samples are missing: use a nearer or faster link, and end other ground stations"
-    if slow := hz < MOST * asked_hz:
+    if slow := hz < SLOW_SHARE * asked_hz:
         remedy = f"{asked_hz:g} Hz were asked for: a faster link, fewer other messages, or a lower --rate"
     yield Finding.check(topic, not (slow or gaps), what, remedy, data)
     yield from _rest(topic, recording)
