@@ -21,13 +21,13 @@ from .losses import Loss
 
 Words = tuple[int, int, int]
 
-# A poll is three accesses: count, bytes, flags. This many polls are checked together, and those after one that is not
-# ordinary are checked again.
+# A poll is three accesses: count, bytes, flags. This many polls are checked together. Where one is not ordinary, those
+# after it are checked again.
 ACCESSES_A_POLL, POLLS_AT_ONCE = 3, 512
 
 
 class Decoder:
-    """Decoder that knows the meaning of the FIFO's bytes from the successful accesses alone.
+    """Decoder of a chip's samples from all accesses to its registers, which show its identity and settings too.
 
     The driver feeds it its own accesses, and a reader those of a capture, so that both get the same samples.
 
@@ -39,8 +39,8 @@ class Decoder:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._held: dict[int, int] = {}
-        self._evidence = Behaviour()
+        self._registers: dict[int, int] = {}
+        self._behaviour = Behaviour()
         self.fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}
         self._accel_offsets: Words | None = None
@@ -48,8 +48,8 @@ class Decoder:
 
     @property
     def corrected(self) -> tuple[Words, Words] | None:
-        """Offset words before and after the reset if they differ: the accelerometer had been corrected."""
-        before, after = (self._words(held) for held in (self._before_reset, self._held))
+        """Offset words before and after the reset, if they differ: then the reset removed a correction."""
+        before, after = (self._words(held) for held in (self._before_reset, self._registers))
         return None if before is None or after is None or before == after else (before, after)
 
     @property
@@ -60,12 +60,12 @@ class Decoder:
         ------
         RecordingError : WHO_AM_I was not read. ChipError : no known part.
         """
-        if reg.WHO_AM_I not in self._held:
+        if reg.WHO_AM_I not in self._registers:
             raise RecordingError(
                 f"{self._name} does not say which chip it is (register 0x{reg.WHO_AM_I:02x})",
                 "record again from the start of the chip",
             )
-        return self._evidence.part(self._held[reg.WHO_AM_I])
+        return self._behaviour.part(self._registers[reg.WHO_AM_I])
 
     def feed(self, transaction: Transaction | Accesses) -> None:
         """Take one access, which may have failed, or many.
@@ -100,8 +100,8 @@ class Decoder:
 
     def _feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None) -> None:
         if self.fifo is None:
-            self._hold(register, data)
-            self._evidence.observe(register, data, self._held)
+            self._store(register, data)
+            self._behaviour.observe(register, data, self._registers)
         elif register == reg.FIFO_COUNT_H:
             self.fifo.set_count(t_ns, int.from_bytes(data, "big"))
         elif register == reg.FIFO_R_W:
@@ -120,15 +120,15 @@ class Decoder:
         elif register == reg.TEMP_OUT_H:
             self.fifo.set_temperature(int.from_bytes(data, "big", signed=True))
         else:
-            self._hold(register, data)
+            self._store(register, data)
 
     def _feed_write(self, register: int, data: bytes) -> None:
         if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
-            self._evidence.reset()
-            self._before_reset = self._before_reset or dict(self._held)
-            self._held = {reg.WHO_AM_I: self._held[reg.WHO_AM_I]} if reg.WHO_AM_I in self._held else {}
+            self._behaviour.reset()
+            self._before_reset = self._before_reset or dict(self._registers)
+            self._registers = {reg.WHO_AM_I: self._registers[reg.WHO_AM_I]} if reg.WHO_AM_I in self._registers else {}
             return
-        self._hold(register, data)
+        self._store(register, data)
         if register == reg.USER_CTRL and data[0] & reg.USER_CTRL_FIFO_RESET:
             self._fifo_was_reset()
 
@@ -162,14 +162,14 @@ class Decoder:
             self.fault = None
         return ACCESSES_A_POLL * polls
 
-    def _hold(self, register: int, data: bytes) -> None:
-        self._held.update(enumerate(data, register))
+    def _store(self, register: int, data: bytes) -> None:
+        self._registers.update(enumerate(data, register))
 
     def _fifo_was_reset(self) -> None:
-        settings = Settings.from_registers(self._held, self.part, self._name)
+        settings = Settings.from_registers(self._registers, self.part, self._name)
         if self.fifo is None:
             self.fifo = FifoDecoder(settings)
-            self._accel_offsets = self._words(self._held)
+            self._accel_offsets = self._words(self._registers)
         elif settings != self.fifo.settings:
             raise RecordingError(f"{self._name} holds samples of two ranges or rates", "record each of them on its own")
         self.fifo.reset()
