@@ -104,7 +104,7 @@ class Kind(NamedTuple):
     def refuses(self) -> str:
         """Return "always", "never" or "depends"."""
         refusals = {sentence.refuse for sentence in self.sentences.values()}
-        if len(refusals) > 1 or None in refusals:
+        if self.refused_when or len(refusals) > 1 or None in refusals:
             return "depends"
         return "always" if True in refusals else "never"
 
