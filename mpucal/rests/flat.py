@@ -16,15 +16,15 @@ from .windows import WINDOW_S, CutWindows
 
 FEWEST = 4  # samples of a window, which is longer than WINDOW_S below 8 Hz
 SHORTEST_FLAT_S = 1.0
-SHORTEST_GIVEN_S = 0.25  # the block means that a fit starts from have no variance in a shorter one
+SHORTEST_GIVEN_S = 0.25  # of a segment that a caller names: a shorter one has too few block means for a variance
 ENOUGH_FLAT_S = 5.0
-LONG = 6  # windows of a flat segment that can do without its first and its last one
+LONG = 6  # so many windows of a flat segment are enough to leave out its first and its last one in any case
 
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
-VISIBLE = 699  # fewer changes from one value to the next larger one, among a thousand, are visible steps
-# Share of this variance that a short rest in a hand leaves: noise and tremor, low-passed by an autopilot, cross few
-# steps. From simulated vehicles with low passes of 5 and 20 Hz.
+VISIBLE = 699  # if a thousand sorted values differ in fewer places, the readings are coarse and show their step
+# Share of the variance of rounding that remains in the mean of a short rest in a hand: behind an autopilot's low-pass
+# filter, noise and tremor cross few steps. From simulated vehicles with filters of 5 and 20 Hz.
 UNAVERAGED = 0.15
 
 # No sensor of this kind has less noise; data without noise are simulated, or stuck.
@@ -40,8 +40,8 @@ class Flat:
     first, last : samples first..last-1 are the segment.
     y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
     Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
-    rounded : (m/s^2)^2, and rounded_rates : (3,) (rad/s)^2, variances of y and b_omega by coarse steps of the stream,
-        which no number of samples reduces.
+    rounded : (m/s^2)^2, and rounded_rates : (3,) (rad/s)^2, variances of y and b_omega by coarse steps of the readings,
+        which more samples do not reduce.
     """
 
     first: int
@@ -60,7 +60,7 @@ class Flat:
 
     @property
     def worth(self) -> float:
-        """Number of samples of independent noise that give y the same variance."""
+        """Number of samples that would give y the same variance without rounding."""
         return min(self.n, float(self.Sigma_a.min()) / self.rounded) if self.rounded else self.n
 
     @property
@@ -91,8 +91,8 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
         return None
     enough = max(min(max(lengths) / 2, ENOUGH_FLAT_S * recording.rate_hz), SHORTEST_FLAT_S * recording.rate_hz)
     _, first, last = next(run for run, length in zip(runs, lengths, strict=True) if length >= enough)
-    # The outermost windows may hold the end of one movement and the beginning of the next: of a short segment, those
-    # that spread further than all inner ones.
+    # The first and the last window may hold the end of one movement and the beginning of the next, and are left out. In
+    # a short segment they are left out only if they vary more than all others.
     level = detector.shares(windows).level[first // n : last // n].tolist()
     if len(level) >= 4:
         most = max(level[1:-1]) if len(level) < LONG else -1.0
@@ -142,9 +142,9 @@ def left_by_rounding(mean: Vector, variance: Vector, step: float, least: float =
 
 
 def rounding(readings: Vector, step: float) -> Vector:
-    """Return the variance of the rounding of readings, in the square of their unit and shape.
+    """Return the variance by rounding for each reading, in the square of its unit.
 
-    Those that truncate to zero come from either side of it.
+    A stream that truncates makes the step around zero twice as wide as the others.
     """
     return np.where(np.abs(readings) < step, 4.0, 1.0) * (UNIFORM * step**2)
 
@@ -157,9 +157,9 @@ def _statistics(values: Vector, flat: tuple[int, int], quietest: float) -> tuple
 
 
 def _steps(values: Vector) -> Vector:
-    """Return (3,) the stream's resolutions, the smallest difference between two values; 0 where as fine as noise.
+    """Return (3,) the steps of the readings, the smallest difference of two values; 0 where they are finer than noise.
 
-    A thousand samples are enough: where nearly all values differ there are no visible steps.
+    A thousand samples are enough: if nearly all of them differ, no step is visible.
     """
     steps = np.diff(np.sort(values[:: max(len(values) // 1000, 1)].T))
     rising = [of[of > 0.0] for of in steps]

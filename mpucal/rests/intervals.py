@@ -22,7 +22,7 @@ from .windows import WINDOW_S, Spreads, noise_variance
 SHORTEST_S = 0.3
 # A share of a rest, within limits, is cut off at either end, since a hand settles, and leaves early.
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25
-FEW = 0.25  # of the windows that hold a sample
+FEW = 0.25  # share of the windows that hold a sample: if fewer are still, the readings may step there
 # The mean rate of a shorter rest, or of its quiet part, may be a slow turn about gravity instead of the bias.
 BIAS_RUN_S = 1.0
 
@@ -30,10 +30,10 @@ Intervals = NDArray[np.intp]
 
 
 class RestFinder:
-    """Finder of the runs of samples in which the board rests, (k, 2) first and last + 1, with the flat segment's.
+    """Finder of the runs of samples in which the board rests, (k, 2) first and last + 1, those of the flat segment too.
 
-    A sample is still where a still window covers it; runs are trimmed at both ends. A window of half a second begins at
-    each sample, and the session's detector judges it with the flat segment's noise and bias.
+    A window of half a second begins at each sample, and the session's detector judges it with the noise and bias of the
+    flat segment. A sample is still if a still window covers it. Runs of still samples are trimmed at both ends.
     """
 
     def __init__(self, recording: Recording, flat: Flat) -> None:
@@ -43,9 +43,10 @@ class RestFinder:
         self._windows = _windows(recording, self._n)
 
     def typical(self) -> Intervals:
-        """Return the rests in which the rate spreads as little as in most of this recording's.
+        """Return the rests in which the rate varies as little as in most rests of this recording.
 
-        That of the flat segment is quiet: in wider limits it would go on while a hand takes the board up.
+        Only for the flat segment the limits are those of a table: within a hand's limits, that rest would include the
+        time in which a hand takes the board up.
         """
         flat, rests, quiet = self._flat, self.within(self._learned()), self._quiet
         at = np.array([[flat.first, flat.last]])
@@ -73,18 +74,18 @@ class RestFinder:
         changes[at + self._n] -= 1
         covered = np.cumsum(changes)[:-1]
         still = (covered > 0) & ~recording.gap
-        # Where readings step from one rest to another, few still windows hold samples of both.
+        # Where readings step from one rest to the next, few still windows hold samples of both.
         few = true_runs((covered < FEW * self._n) & still)
         inside = (few[:, 0] > 0) & (few[:, 1] < len(still))
         for first, last in few[inside].tolist():
             if still[first - 1] and still[last]:
                 still[first:last] = False
         levels = [true_runs(still)]
-        # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.
+        # A run in which gravity turns is replaced by its samples with little rate.
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
         still[self._n // 2 : self._n // 2 + len(slow)] &= slow
         runs = true_runs(still)
-        # Where gravity turns and the gyroscope does not, the sensor changed: keep the halves in which gravity rests.
+        # Where gravity turns without a rate, the sensor changed: such a run is halved until gravity rests in the parts.
         while len(runs):
             levels.append(runs)
             runs = _halves(runs, self._n)
@@ -95,7 +96,7 @@ class RestFinder:
         return self.within(QUIET)
 
     def _trimmed(self, levels: list[Intervals]) -> Iterator[Intervals]:
-        """Yield of each level the runs without their ends that are long enough and in which gravity does not turn."""
+        """Yield, for each level, its runs without their ends, if they are long enough and gravity does not turn."""
         rate = self._recording.rate_hz
         # All at once, since there are many levels of few runs.
         runs, level = np.concatenate(levels), np.repeat(np.arange(len(levels)), list(map(len, levels)))
@@ -117,7 +118,7 @@ class RestFinder:
 
 
 def _and_others(runs: Intervals, others: Intervals) -> Intervals:
-    """Return the runs, and those of the others that overlap none of them."""
+    """Return the runs, and the `others` that overlap none of them, in order of time."""
     both = np.concatenate([runs, others[_apart(others, runs)]])
     # Two sorted runs are merged. NumPy's default for AVX2 crashed in QEMU's emulation of it.
     return np.asarray(both[np.argsort(both[:, 0], kind="stable")])
