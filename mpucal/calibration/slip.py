@@ -1,9 +1,10 @@
 """Slip of the mount between two rests, or within one of the last: from then on, gravity contradicts the gyroscope.
 
-A miss between rests that the gyroscope's noise does not explain is taken for an error of the gyroscope, and the fit
-becomes unsure of everything. A mount that slipped leaves a pattern: rotations delta of the accelerometer against the
-gyroscope, one before and one after, explain all misses. They do where the likelihood says so, by the BIC. In a rest the
-gyroscope hardly errs: a slip shows as a turn of gravity between its halves, which no other rest has.
+The miss of a transition is the angle by which gravity, carried by the gyroscope from one rest, misses gravity as
+measured in the next. A fit takes large misses for errors of the gyroscope, and its uncertainties grow. But a mount that
+slipped leaves a pattern: one rotation of the accelerometer relative to the gyroscope before the slip, and another one
+after it, explain all misses. The BIC decides whether they do. Within a rest the gyroscope hardly errs, and a slip shows
+as a turn of gravity between the halves of that rest alone.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Slip(NamedTuple):
 
     span : (2,) s after the flat segment, between which it happened. delta : (3,) rad, rotation of the accelerometer.
     transitions : all of them, with the misses that remain after the slip.
-    near_end : True in the first or last two transitions, where no hypothesis sees what the sensor was or is.
+    near_end : True in the first or last two transitions: too little was recorded before, or after, to see the change.
     """
 
     span: tuple[float, float]
@@ -53,9 +54,9 @@ class Slip(NamedTuple):
 def find_slip(
     transitions: Sequence[Transition], prepared: Preprocessed, theta: Theta, spoilt: Mask
 ) -> tuple[Slip | None, Vector]:
-    """Return the slip that surely happened, or None, and mean squares (12,) of what D and b_a change by at the ends.
+    """Return the slip that is certain, or None, and the variances (12,) of D and b_a by slips that are possible.
 
-    Near the ends, a miss that is not by chance is taken for a slip. spoilt : see end_slips.
+    Near the ends of the recording, a miss that is hardly by chance is taken for a slip. spoilt : see end_slips.
     """
     t = np.concatenate([[0.0], np.cumsum(prepared.problem.series.dt)])
     ends = [*zip(end_slips(transitions, spoilt).tolist(), transitions, strict=True), *_at_rest(prepared, theta, spoilt)]
@@ -70,15 +71,15 @@ def find_slip(
 def _between_rests(transitions: Sequence[Transition], series: Series, theta: Theta, t: Vector) -> Slip | None:
     """Return the slip that explains the misses of transitions between rests under theta, or None.
 
-    K is estimated again with it, and without, since a K that was estimated without it hides much of it.
+    K is estimated again, with the slip and without, since a K that was estimated without it explains much of it.
     """
     k, (n, p) = len(transitions), _numbers(transitions)
     if n <= p:
         return None
-    # The cost of three numbers more, and of so many times; few misses are explained by anything.
+    # What the slip must gain: odds, three numbers and the choice of a time; more if there are hardly enough misses.
     cost = (math.log(SURE) + 1.5 * math.log(n) + math.log(k)) * n / (n - p)
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
-    # No likelihood is above 0, that of no misses at all.
+    # A slip gains at most the log likelihood's distance from 0, its value for no misses at all.
     if not -_log_likelihood(misses, known) > cost:
         return None
     places = np.arange(2, k - 2)  # a rotation has three numbers, and each transition shows two of them
@@ -95,8 +96,8 @@ def _between_rests(transitions: Sequence[Transition], series: Series, theta: The
 def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     """Return probabilities (k,) of a slip in each transition; 0 but for the first and last two.
 
-    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. What the next transition undoes is an
-    error of the rest between them.
+    There a slip leaves no pattern, and looks like a turn that the gyroscope missed. A miss that the next transition
+    undoes does not count: it is an error of the rest between them.
 
     spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
     """
@@ -108,10 +109,10 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
 
 
 def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[float, Transition]]:
-    """Return probabilities of a slip within the last two rests, and what it would be; nothing if rests are too few.
+    """Return the probability and the transition of a slip within each of the last two rests; none if rests are too few.
 
-    The gyroscope tells how the board turned as it rested. From the first half of a rest to the second, gravity misses
-    that by as much as the hand sways, in these rests as in so long a part of the others. spoilt : see end_slips.
+    Between the halves of a rest, gravity misses the turn that the gyroscope shows, because of the hand's sway. The miss
+    in each of these two rests is compared with those in equally long parts of the others. spoilt : see end_slips.
     """
     recording, flat, runs = prepared.recording, prepared.flat, prepared.runs
     # each half is long enough for a rest
@@ -139,9 +140,9 @@ def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[f
 
 
 def slip_squares(transition: Transition, D: Vector) -> Vector:
-    """Return mean squares (12,) of what D and b_a change by, if a slip in a transition explains its miss.
+    """Return mean squares (12,) of the changes of D and b_a by the slip that explains the miss of a transition.
 
-    The miss does not show the rotation about gravity; each axis of a rotation turns as much as the others.
+    The miss does not show the rotation about gravity, which is taken to be as large as that about any other axis.
     """
     seen = D @ cross(transition.miss)
     unseen = D @ cross(transition.coming / norm(transition.coming)) * norm(transition.miss) / math.sqrt(2.0)
@@ -149,7 +150,7 @@ def slip_squares(transition: Transition, D: Vector) -> Vector:
 
 
 def _probability(misses: Vector, known: Vector) -> Vector:
-    """Return probabilities (k,) that slips make misses (k, 3), and not chance; 0 but for the first and last two.
+    """Return probabilities (k,) that misses (k, 3) are by slips and not by chance; 0 but for the first and last two.
 
     One of SURE recordings has a slip in one of these four places. Without one, a miss as large has the chance that
     Student's t gives. known : (k,) their variances, but for a common scale.

@@ -22,17 +22,18 @@ from .theta import Theta
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 FEWEST_TRANSITIONS = 3  # fewer cannot contradict each other
 REWEIGHTED = 8  # iterations of a least squares fit whose weights depend on the residuals
-DEGREES_OF_FREEDOM = 4.0
-# A transition of less weight gets a scale of its own; the others differ by chance.
+DEGREES_OF_FREEDOM = 4.0  # of Student's t distribution of the misses
+# The gyroscope lost a transition of less weight than this. Its variance has a scale of its own, and the others' one.
 WORTHLESS = 0.02
 
 
 class Transition(NamedTuple):
     """Transition from one rest to the next.
 
-    span : its steps of the series. F : (3, 3), their effect on gravity in the body frame.
-    leaving, coming : (3,) m/s^2, gravity at its start and its end. miss : (3,) rad, from gravity as the gyroscope
-    carries it to gravity at the end. variance : rad^2 an axis, of the miss by noise; of_gyro : the gyroscope's share.
+    span : its steps of the series. F : (3, 3), rotation by the gyroscope that takes gravity in the body frame from its
+    start to its end. leaving, coming : (3,) m/s^2, gravity as measured at its start and its end.
+    miss : (3,) rad, rotation from F `leaving` to `coming`. variance : rad^2 an axis, of the miss by known noise;
+    of_gyro : the gyroscope's share of it.
     """
 
     span: slice
@@ -60,12 +61,12 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
 
 
 def miss_variances(transitions: Sequence[Transition], leverage: Vector | float = 0.0) -> Vector:
-    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses, at least the known ones.
+    """Return variances (k,) [rad^2 an axis] that explain all misses: the known ones times a common scale, at least 1.
 
-    All transitions have a common scale, and a lost one has a scale of its own.
+    A lost transition has a scale of its own.
 
-    leverage : (k,), the share that the estimate took of the two degrees of freedom of each miss. The most likely scale,
-        for the estimate itself, has none; an honest one counts what is left.
+    leverage : (k,), number of degrees of freedom, of the two of each miss, that the estimate has used up. It is 0 for
+        the most likely scale, which the estimate itself needs, and not for that of its honest uncertainty.
     """
     known, c, weight = _scales(transitions, leverage)
     return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
@@ -77,13 +78,13 @@ def are_explained(transitions: Sequence[Transition]) -> bool:
 
 
 def each_variance(transitions: Sequence[Transition]) -> tuple[Vector, Vector]:
-    """Return the variance (k,) [rad^2 an axis] of each miss, if the gyroscope's error beyond its noise varies.
+    """Return the variance (k,) [rad^2 an axis] of each miss, as the gyroscope's error beyond its noise varies.
 
-    It is as often large as Student's t says: a transition in which the sensor met the table misses by several times
-    what the others do, and no change of the sensor is needed to explain it.
+    The error is distributed by Student's t. So a transition in which the sensor met the table may miss by several times
+    what the others do, and needs no change of the sensor as an explanation.
 
-    The second value (k,) is the factor by which the acceleration's weight is reduced in each transition; otherwise the
-    acceleration would decide how the board turned. In a lost transition it is 1: only the acceleration shows the turn.
+    The second value (k,) is the factor by which the weight of the acceleration is reduced in each transition. Otherwise
+    the acceleration alone would decide how the board turned, as it may where the gyroscope lost it: there it is 1.
     """
     known, c, weight = _scales(transitions, 0.0)
     return (1.0 + (c - 1.0) / weight) * known, np.where(weight < WORTHLESS, 1.0, np.minimum(weight, 1.0))
