@@ -26,7 +26,8 @@ SHORTEST_RUN = 8
 CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a long gap is unknown
 BRIDGED_S = 0.25  # longest gap across which a hand's rate is interpolated; its error is tried out so far on both sides
-CLIPPED_RATE_SD = 0.0015  # share of |omega|, of one clipped sample; in a longer run the rate goes farther beyond
+CLIPPED_TURN_SD = 0.3  # of the turn that a run of clipped rates hides: a hand's moves of several forms err by less
+SLOPE_S = 0.02  # over which the slope of the rates beside such a run is measured
 
 # After a gap with a larger uncertainty of the turn, the filter's linear correction falls short of the turn: so many
 # samples more are allowed to correct it.
@@ -83,7 +84,47 @@ def with_masks(recording: Recording) -> Recording:
         # An axis that repeats its largest or smallest value, and reaches it at another time too, is clipped.
         if value in (column.min(), column.max()) and np.count_nonzero(column == value) > last - first:
             marked.acc_clipped[first - 1 : last - 1] = True
-    return replace(marked, gyr=_without_spikes(recording))
+    return replace(marked, gyr=_beyond_range(replace(marked, gyr=_without_spikes(recording))))
+
+
+def _beyond_range(recording: Recording) -> Vector:
+    """Return the rates (n, 3), short runs of clipped ones replaced by what the slopes on both sides suggest."""
+    gyr = recording.gyr.copy()
+    n, longest = max(round(SLOPE_S * recording.rate_hz), 1), BRIDGED_S * recording.rate_hz
+    for column in gyr.T if recording.gyr_clipped.any() else ():
+        for rail in (column.max(), column.min()):
+            for first, last in true_runs(recording.gyr_clipped & (column == rail)).tolist():
+                if 1 < last - first < longest and first > n and last + n < len(column):
+                    beyond = _cubic(recording.t, column, (first - 1, last), n)
+                    column[first:last] = np.maximum(beyond, rail) if rail > 0.0 else np.minimum(beyond, rail)
+    return gyr
+
+
+def _cubic(t: Vector, values: Vector, ends: tuple[int, int], n: int) -> Vector:
+    """Return values between two samples by a cubic through both, with the slopes of n samples on both sides."""
+    begin, end = ends
+    (before, first, last, after), seconds = values[[begin - n, begin, end, end + n]], t[end] - t[begin]
+    rise, fall = (first - before) / (t[begin] - t[begin - n]), (after - last) / (t[end + n] - t[end])
+    x, slope = (t[begin + 1 : end] - t[begin]) / seconds, (last - first) / seconds
+    bend = (rise - slope) * (1.0 - x) - (fall - slope) * x
+    return np.asarray(first + seconds * x * (slope + (1.0 - x) * bend))
+
+
+def _hidden_by_range(recording: Recording) -> Vector:
+    """Return the variance (n,) [rad^2 an axis] of the turn in each step of a run of clipped rates.
+
+    It is that of the turn by which the rates in the run exceed those at its ends; in a long run the turn is unknown.
+    """
+    t, gyr, variance = recording.t, recording.gyr, np.zeros(len(recording))
+    for first, last in true_runs(recording.gyr_clipped).tolist():
+        steps = slice(first, min(last + 1, len(t)))
+        seconds = float(t[steps][-1] - t[max(first - 1, 0)])
+        ends = 0.5 * (gyr[max(first - 1, 0)] + gyr[steps][-1])
+        hidden = CLIPPED_TURN_SD * np.linalg.norm(gyr[first:last].mean(axis=0) - ends) * seconds
+        if last - first >= BRIDGED_S * recording.rate_hz:
+            hidden = max(hidden, np.sqrt(GAP_ANGLE_VARIANCE * seconds))
+        variance[steps] += hidden**2 / len(variance[steps])
+    return variance
 
 
 def _without_zeros(recording: Recording) -> Recording:
@@ -147,8 +188,6 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     gap, acc, gyr = recording.gap[last:], recording.acc_clipped[last:], recording.gyr_clipped[last - 1 :]
     if not (gap.any() or acc.any() or gyr.any()):
         return series
-    clipped = gyr[:-1] | gyr[1:]
-    rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
     rates, variance = _bridged(recording)
     q_extra = variance[last:].copy()
     # Nothing is known of the rate in a long gap: it counts as zero.
@@ -160,7 +199,7 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     # gravity shows the turn, for which a linear correction may be too large
     shown = lost[up[lost].any(axis=1) & up[lost + 1].any(axis=1)]
     omega[shown] = flat.b_omega - shortest_turns(up[shown], up[shown + 1]) / series.dt[shown, None]
-    q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
+    q_extra += _hidden_by_range(recording)[last:]
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
 
 
