@@ -50,6 +50,7 @@ lint: $(TESTED)
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	$(BIN)/python -m pytest -q tests/test_docstrings.py
 
 # what is locked, against the known vulnerabilities; needs the network, and says which packages it could not look up
 audit:

@@ -79,7 +79,7 @@ def recording_digest(recording: Recording) -> str:
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     recording, flat, fit = evidence.recording, evidence.flat, evidence.fit
-    gyroscope_known = evidence.gyroscope is None  # one at fault shows neither bias nor noise
+    gyroscope_known = evidence.gyro_fault is None  # one at fault shows neither bias nor noise
     common: dict[str, Any] = {
         "fit": _fit_document(evidence, chosen),
         "quality": judge(evidence),

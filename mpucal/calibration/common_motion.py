@@ -59,7 +59,7 @@ def beside_first(first: Evidence, other: Evidence) -> Evidence:
 def _is_plain(evidence: Evidence) -> bool:
     """Return True for an estimate by a good gyroscope, in which the sensor did not change."""
     unchanged = evidence.changed is None and (evidence.claim is None or evidence.claim.change is None)
-    return unchanged and evidence.model in MODELS and evidence.gyroscope is None and evidence.uncertainty is not None
+    return unchanged and evidence.model in MODELS and evidence.gyro_fault is None and evidence.uncertainty is not None
 
 
 def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:

@@ -131,7 +131,7 @@ def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
     segment = recording.flat or find_flat(recording)
     usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
-    evidence = replace(before, model="static", gyroscope=usable, flat=flat)
+    evidence = replace(before, model="static", gyro_fault=usable, flat=flat)
     if flat is None or is_unusable(evidence):
         return evidence
     return replace(evidence, fit=fit_static(recording, flat, before.gravity))
@@ -162,7 +162,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     explanations = explain(plain.parts, plain.D, fitted.explanations)
     claim = claim_uncertainty(fit, gravity, explanations, fitted.left_by_changes())
     fit = inflate(fit, claim).right_handed()
-    evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=fitted.changes)
+    evidence = replace(before, fit=fit, model=choice.model, claim=claim, gyro_changes=fitted.changes)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 

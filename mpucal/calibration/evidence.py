@@ -38,13 +38,13 @@ class Evidence:
     """Recording and its fit; flat and fit are None where the estimation did not get so far.
 
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
-    gyroscope : the gyroscope's fault, because of which the estimate uses the rests alone; None where it uses the rates,
+    gyro_fault : of the gyroscope, because of which the estimate uses the rests alone; None where it uses the rates,
         or where the user asked for the rests alone.
     changed : None; or what changed the sensor, if the estimate uses only the part of the recording before or after it.
     first : index of the first sample within the whole recording; above 0 for such a part.
     decoded : the recording as read, before anything was masked, and how it was corrected.
     against_rests : why the rests are not enough for an estimate, where no rates were recorded.
-    walks : changes of the gyroscope's bias, which were removed from the rates for the fit.
+    gyro_changes : changes of the gyroscope's bias, which were removed from the rates for the fit.
     """
 
     recording: Recording
@@ -54,18 +54,18 @@ class Evidence:
     model: str
     claim: UncertaintyClaim | None = None
     gravity_anyway: bool = False
-    gyroscope: Reason | None = None
+    gyro_fault: Reason | None = None
     changed: Reason | None = None
     first: int = 0
     decoded: Decoded | None = None
     against_rests: tuple[Reason, ...] = ()
-    walks: tuple[Explanation, ...] = ()
+    gyro_changes: tuple[Explanation, ...] = ()
 
     def part(self, first: int, last: int) -> Evidence:
         """Return the evidence of the samples first..last-1, before their estimation."""
         decoded = None if self.decoded is None else self.decoded.part(first, last)
         part = replace(self, recording=self.recording.part(first, last), first=first, decoded=decoded)
-        return replace(part, flat=None, fit=None, claim=None, walks=())
+        return replace(part, flat=None, fit=None, claim=None, gyro_changes=())
 
     @property
     def is_of_now(self) -> bool:

@@ -100,7 +100,7 @@ class Fits:
         self._tried, self._tried_count = evidence, len(recording)
         reasons = find_reasons(evidence)
         # The rests alone may suffice for an estimate, but its verification needs a sound gyroscope.
-        first_verdict = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
+        first_verdict = verdict(reasons) if evidence.gyro_fault is None and evidence.is_of_now else REFUSED
         shown = _most_specific_reason(reasons, evidence.recording)
         return Tried(first_verdict, shown and shown.about(recording.sensor.origin))
 
@@ -111,8 +111,8 @@ class Fits:
             return Checked((), False, reason("verification_failed", "nothing"))
         recording, first = with_masks(self._store.recording()), evidence.first
         after = recording.part(first, len(recording))
-        for walk in evidence.walks:
-            after = remove_change(after, evidence.flat, walk)
+        for change in evidence.gyro_changes:
+            after = remove_change(after, evidence.flat, change)
         rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._tried_count - first)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((each for each in find_reasons(evidence) if each.code == CONTRADICTION), None)

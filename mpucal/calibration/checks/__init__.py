@@ -99,7 +99,7 @@ def find_reasons(e: Evidence) -> list[Reason]:
         return [only[0], *e.against_rests]
     # A fit with the gyroscope exists only where the recording is usable.
     rows = [row for row in TABLE if not (row.of_gyroscope if of_rests else row.unusable and e.fit is not None)]
-    reasons = [known for known in (e.gyroscope, e.changed) if known is not None] + [*_found(e, rows)]
+    reasons = [known for known in (e.gyro_fault, e.changed) if known is not None] + [*_found(e, rows)]
     codes = {each.code for each in reasons}
     return sorted((each for each in reasons if not is_explained(each.code, codes)), key=lambda each: not each.refuse)
 
