@@ -338,6 +338,19 @@ def test_a_hand_that_trembles_as_it_turns_a_board_is_no_motor(in_hand):
     assert judged(Recording.from_arrays(t, acc + tremor[:, None] * [0.6, 0.6, 0.5], gyr)) == ("good", {})
 
 
+def test_two_sensors_that_take_turns_are_told_from_a_hum(in_hand):
+    """A hum of nearly half the sample rate makes every other reading differ, too, but not alike in all rests."""
+    recording = in_hand.recording
+    other = np.arange(len(recording))[:, None] % 2
+    gain, bias, drift = 1.0 + 0.02 * other, other * [0.3, -0.2, 0.4], other * [0.03, -0.02, 0.01]
+    joined = replace(recording, acc=gain * recording.acc + bias, gyr=recording.gyr + drift)
+    verdict, reasons = judged(joined)
+    assert verdict == "refused"
+    assert "take turns" in reasons["not_raw"]
+    hum = 0.2 * np.cos(2.0 * np.pi * 49.99 * recording.t)[:, None] * [0.6, 0.6, 0.5]
+    assert judged(replace(recording, acc=recording.acc + hum)) == ("good", {})
+
+
 def test_a_bit_that_a_hum_passes_over_as_a_recording_ends_is_not_stuck(in_hand):
     """Swing at half the sample rate by 256 counts, from one word with bit 7 to the next."""
     counts = np.rint(in_hand.recording.acc * 16384.0 / STANDARD_GRAVITY_MPS2).astype(int)

@@ -79,19 +79,29 @@ def same_magnitude(e: Evidence) -> Reason | None:
 
 
 def two_sensors(e: Evidence) -> Reason | None:
-    """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest."""
-    at_rest = slice(e.flat_segment.first, e.flat_segment.last)
-    readings = np.hstack([e.recording.acc[at_rest], e.recording.gyr[at_rest]])
+    """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest.
+
+    In no other rest does it differ the other way, as by a vibration of nearly half the sample rate.
+    """
+    apart = _apart(e, e.flat_segment.first, e.flat_segment.last)
+    for rest in e.rests.tolist() if apart.any() else ():
+        apart[apart * _apart(e, *rest) < 0.0] = 0.0
+    if not apart.any():
+        return None
+    apart = np.abs(apart)
+    return reason("not_raw", "two_sensors", apart=apart[:3].max(), rates=np.rad2deg(np.nan_to_num(apart[3:]).max()))
+
+
+def _apart(e: Evidence, first: int, last: int) -> Vector:
+    """Return (6,) by how much every other reading of a rest differs, and rate; 0 where it does not along all of it."""
+    readings = np.hstack([e.recording.acc[first:last], e.recording.gyr[first:last]])
     size = len(readings) // (2 * FEWEST_SAMPLES)
     if not size:
-        return None
+        return np.zeros(6)
     pairs = readings[: 2 * FEWEST_SAMPLES * size].reshape(FEWEST_SAMPLES, size, 2, 6)
     differences = np.diff(pairs, axis=2)[:, :, 0].mean(axis=1)
-    apart = np.abs(differences.mean(axis=0))
-    # a vibration, even of half the sample rate, changes its phase
-    if not (apart > MOST_STD * differences.std(axis=0)).any():
-        return None
-    return reason("not_raw", "two_sensors", apart=apart[:3].max(), rates=np.rad2deg(np.nan_to_num(apart[3:]).max()))
+    apart = differences.mean(axis=0) * (-1.0) ** first
+    return np.where(np.abs(apart) > MOST_STD * differences.std(axis=0), apart, 0.0)
 
 
 def gyroscope_unit(e: Evidence) -> Reason | None:
