@@ -27,7 +27,7 @@ CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a long gap is unknown
 BRIDGED_S = 0.25  # longest gap across which a hand's rate is interpolated; its error is tried out so far on both sides
 CLIPPED_TURN_SD = 0.3  # of the turn that a run of clipped rates hides: a hand's moves of several forms err by less
-SLOPE_S = 0.02  # over which the slope of the rates beside such a run is measured
+SMOOTH_S = 0.02  # time over which the slope of the rates, an angular acceleration, is measured
 
 # After a gap with a larger uncertainty of the turn, the filter's linear correction falls short of the turn: so many
 # samples more are allowed to correct it.
@@ -90,7 +90,7 @@ def with_masks(recording: Recording) -> Recording:
 def _beyond_range(recording: Recording) -> Vector:
     """Return the rates (n, 3), short runs of clipped ones replaced by what the slopes on both sides suggest."""
     gyr = recording.gyr.copy()
-    n, longest = max(round(SLOPE_S * recording.rate_hz), 1), BRIDGED_S * recording.rate_hz
+    n, longest = max(round(SMOOTH_S * recording.rate_hz), 1), BRIDGED_S * recording.rate_hz
     for column in gyr.T if recording.gyr_clipped.any() else ():
         for rail in (column.max(), column.min()):
             for first, last in true_runs(recording.gyr_clipped & (column == rail)).tolist():

@@ -15,7 +15,7 @@ from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.limits import MOVING_RAD_S
 from ..rests.tremor import SWAY_PER_S, without_tremor
 from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
-from .masks import mask
+from .masks import SMOOTH_S, mask
 from .poses import POSE_MPS2, Poses
 from .problem import Problem, Series
 from .rotation import lengths
@@ -23,7 +23,6 @@ from .theta import Prior
 
 HUBER = 2.0
 SHAKEN_MPS2 = 0.3  # standard deviation of |y| in a window that does the same, at any rate: walking shakes the board
-SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration by jerks, in addition to the pivot's own

@@ -89,15 +89,16 @@ def find_sensitivity(
             return None
     left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
     assert found.to_ends is not None
-    # The gyroscope's bias may change besides; where nothing is likely without S, nothing is with it.
-    scores = part_scores(less, before, SENSITIVE, found.to_ends).moved(step)
-    parts = with_times(less, theta, scores, H, np.zeros(SENSITIVE))
-    beside = rank(parts, theta.D) if others > np.log(SURE) else explanations
+    beside = explanations
+    if others > np.log(SURE):  # where nothing is likely without S, nothing is with it
+        scores = part_scores(less, before, SENSITIVE, found.to_ends).moved(step)
+        parts = with_times(less, theta, scores, H, np.zeros(SENSITIVE))
+        beside = rank(parts, theta.D)
+        change = gyroscope_change(beside)
+        if change is not None:
+            s, C = s + change.shift[0, HAND:], C + unseen_changes([change], parts, theta.D, prepared.rests_often)
+            left -= 2.0 * change.evidence
     evidence += np.logaddexp.reduce([0.0, *(each.log_share for each in beside)])
-    change = gyroscope_change(beside)
-    if change is not None:
-        s, C = s + change.shift[0, HAND:], C + unseen_changes([change], parts, theta.D, prepared.rests_often)
-        left -= 2.0 * change.evidence
     # No chip feels so much; a drift on a machine that turns evenly passes for it.
     beyond = s @ s > most_chi2(len(s)) * SENSITIVITY_SD**2
     if beyond or not left < HOPELESS_NIS * len(series):

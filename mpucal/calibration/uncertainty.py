@@ -77,8 +77,8 @@ class UncertaintyClaim:
 
     Attributes
     ----------
-    covariance : (p, p) of the model, without the changes of the gyroscope's bias that were removed. model : m/s^2, the
-        error by it, rms over all directions.
+    covariance : (p, p) of the model, a nonlinearity and what is unknown of changes of the gyroscope's bias that were
+        removed. model : m/s^2, the error by it, rms over all directions.
     floored : m/s^2, `model` enlarged where changes were removed, and where few sides were down.
     explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
     slipped : (12,) variances of D and b_a by slips of the mount near the ends, which no explanation holds.

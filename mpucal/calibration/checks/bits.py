@@ -23,7 +23,6 @@ from .unusable import dead_accelerometer, dead_gyroscope
 
 # Share of the changes in which a stuck bit changes, by errors, and most share of a sound one.
 ERRORS, SOUND = 0.1, 0.98
-FEW_ONES = 0.5 * ERRORS  # share of the samples in which a stuck bit is another one: an error changes it twice
 # Fewer dead low bits do not matter; so many on all axes are a byte that was not read, and no coarse sensor.
 DEAD_BITS, LOST_BYTE = 3, 7
 # Rounding of the rates by more refuses a calibration.
@@ -86,9 +85,9 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
 
     Across a gap, as between files of single faces, nothing changes.
     """
+    few = 0.5 * ERRORS  # share of the samples in which a stuck bit is another one: an error changes it twice
     # Bits may die midway: they are counted in parts. For a second or two, a swing may leave a bit unchanged.
-    last = (1.0 - FEW_ONES) * len(counts)
-    edges = np.unique(np.linspace(0, last, MOST_PARTS, endpoint=False).astype(np.int64))
+    edges = np.unique(np.linspace(0, (1.0 - few) * len(counts), MOST_PARTS, endpoint=False).astype(np.int64))
     evidence = _kernel.stuck_odds(counts, gap, edges, ERRORS, SOUND)
     # of all parts from one on
     after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
@@ -96,7 +95,7 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
     # What swings by whole steps of a bit leaves it unchanged from one sample to the next, and not for long.
     for bit, axis in np.argwhere(stuck):
         ones = float(np.mean(counts[first[bit, axis] + 1 :, axis] >> bit & 1))
-        stuck[bit, axis] = min(ones, 1.0 - ones) < FEW_ONES
+        stuck[bit, axis] = min(ones, 1.0 - ones) < few
     return stuck, first
 
 

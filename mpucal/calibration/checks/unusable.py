@@ -81,11 +81,12 @@ def same_magnitude(e: Evidence) -> Reason | None:
 def two_sensors(e: Evidence) -> Reason | None:
     """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest.
 
-    In no other rest does it differ the other way, as by a vibration of nearly half the sample rate.
+    In no other rest before a gap does it differ the other way, as by a vibration of nearly half the sample rate.
     """
     apart = _apart(e, e.flat_segment.first, e.flat_segment.last)
-    for rest in e.rests.tolist() if apart.any() else ():
-        apart[apart * _apart(e, *rest) < 0.0] = 0.0
+    for first, last in e.rests.tolist() if apart.any() else ():
+        if not e.recording.gap[e.flat_segment.last : first].any():  # across it, the other sensor's turn may be next
+            apart[apart * _apart(e, first, last) < 0.0] = 0.0
     if not apart.any():
         return None
     apart = np.abs(apart)
@@ -93,7 +94,7 @@ def two_sensors(e: Evidence) -> Reason | None:
 
 
 def _apart(e: Evidence, first: int, last: int) -> Vector:
-    """Return (6,) by how much every other reading of a rest differs, and rate; 0 where it does not along all of it."""
+    """Return (6,) m/s^2 and rad/s, by how much every other sample of a rest differs; 0 where not along all of it."""
     readings = np.hstack([e.recording.acc[first:last], e.recording.gyr[first:last]])
     size = len(readings) // (2 * FEWEST_SAMPLES)
     if not size:
