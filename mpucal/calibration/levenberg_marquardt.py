@@ -148,14 +148,12 @@ class _At:
     ) -> None:
         self.theta, parameters = theta, len(free)
         self.data: Evaluation = evaluate(problem, theta, parameters, ends)
-        away = (theta.values() - prior.mean)[:parameters]
-        precision = prior.precision[:parameters]
-        self.V = self.data.V + 0.5 * float(precision @ (away * away))
+        self.V = self.data.V + prior.cost(theta, parameters)
         if not np.isfinite(self.V):
             self.V = np.inf
-        self.H = self.data.fisher + np.diag(precision)
+        self.H = self.data.fisher + np.diag(prior.precision[:parameters])
         self.free_H = self.H[np.ix_(free, free)]
-        self.gradient = (self.data.gradient + precision * away)[free]
+        self.gradient = (self.data.gradient + prior.gradient(theta, parameters))[free]
 
     @cached_property
     def newton(self) -> Vector:

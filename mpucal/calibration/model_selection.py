@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Recording
+from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
@@ -25,7 +25,7 @@ from .levenberg_marquardt import LAST, MOST_ITERATIONS, ROUGHLY, Minimum, minimi
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
-from .parameters import ACCEL, IMU
+from .parameters import ACCEL, IMU, NAMES
 from .problem import Problem, Series
 from .rotation import lengths
 from .sampling import with_sampling_errors
@@ -116,7 +116,7 @@ class InPlaceFits:
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
         self._recording, self._flat, self._gravity = recording, flat, gravity
-        self._prior = Prior.of_sensor(flat, recording.sensor)
+        self._without_matrix = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
     def choose(self) -> ModelChoice | str:
@@ -131,7 +131,7 @@ class InPlaceFits:
                 if parameters == ACCEL:
                     minimum = self._fit_matrix(minimum, errors) or minimum
                 of_means, step_s = _with_errors(self._thin, errors), 1.0 / self._recording.rate_hz
-                hand = find_hand_effects(of_means, *self._means, minimum, self._prior, step_s)
+                hand = find_hand_effects(of_means, *self._means, minimum, self._without_matrix, step_s)
                 if hand.likely is not None:
                     return f"the data show {hand.likely}"
                 return self._chosen(minimum, errors, hand)
@@ -163,7 +163,7 @@ class InPlaceFits:
         for _ in range(PASSES if erring else 0):
             theta = minimum.theta
             errors = min(ERRORS, key=lambda these: evaluate(_with_errors(self._thin, these), theta, 0).V)
-            minimum = minimise(_with_errors(self._thin, errors), theta, parameters, self._prior, until=ROUGHLY)
+            minimum = self._search_means(parameters, theta, errors)
         if minimum.nis < HOPELESS_NIS:
             minimum = self._minimum(parameters, minimum, errors)
         return minimum, errors
@@ -175,7 +175,7 @@ class InPlaceFits:
         """
         problem, most = _with_errors(self._problem, errors), MOST_ITERATIONS if near.converged else 0
         search = partial(minimise, unseen=5.0 * LAST) if parameters == ACCEL else minimise
-        minimum = search(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
+        minimum = search(problem, near.theta, parameters, self._prior(parameters), most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def _fit_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
@@ -186,24 +186,47 @@ class InPlaceFits:
         problem = _with_errors(self._problem, errors)
         if not near.converged:
             return None
-        first = minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1)
+        first = minimise(problem, near.theta, IMU, self._prior(IMU), until=PROMISING, most=1)
         if first.iterations == 0:
             return None
-        rough = minimise(_with_errors(self._thin, errors), first.theta, IMU, self._prior, until=ROUGHLY)
+        rough = self._search_means(IMU, first.theta, errors)
         imu = self._minimum(IMU, rough if rough.converged else near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
     def _as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """Return the fit with the scores of the recording's parts."""
         at_prior = undetermined(minimum.covariance()) if len(minimum.free) > ACCEL else ()
-        return minimum.as_fit(at_prior, parts_of(_with_errors(self._problem, errors), minimum, self._prior))
+        prior = self._prior(len(minimum.free))
+        return minimum.as_fit(at_prior, parts_of(_with_errors(self._problem, errors), minimum, prior))
 
     def _rough(self, parameters: int) -> Minimum:
-        """Search on means over blocks, once for each number of parameters."""
+        """Return the minimum on means over blocks, found once for each number of parameters."""
         if parameters not in self._roughly:
             begin = self._first if parameters == ACCEL else self._rough(ACCEL).theta
-            self._roughly[parameters] = minimise(self._thin, begin, parameters, self._prior, until=ROUGHLY)
+            self._roughly[parameters] = self._search_means(parameters, begin)
         return self._roughly[parameters]
+
+    def _search_means(self, parameters: int, begin: Theta, errors: Errors = NO_ERRORS) -> Minimum:
+        return minimise(_with_errors(self._thin, errors), begin, parameters, self._prior(parameters), until=ROUGHLY)
+
+    def _prior(self, parameters: int) -> Prior:
+        return self._without_matrix if parameters == ACCEL else self._with_matrix
+
+    @cached_property
+    def _with_matrix(self) -> Prior:
+        """Prior with the slope by K that the noise of the rates takes away ("errors in variables").
+
+        The rates are in the derivatives by K, with the noise that is in the innovations, too. So the gradient's mean at
+        the true K is minus the sum of tr(S^-1 dS/dK) / 2 over the samples, where S depends on K by the noise. A factor
+        of an axis' K acts on S as the square root of its noise's variance does, inversely.
+        """
+        problem, theta = self._thin, self._rough(ACCEL).theta
+        slope, step = np.zeros(len(NAMES)), 0.02
+        for name, axis in zip(("K_xx", "K_yy", "K_zz"), np.eye(3), strict=True):
+            more, less = (evaluate(_with_noise(problem, np.exp(sign * step * axis)), theta, 0) for sign in (1.0, -1.0))
+            of_S = (more.V - 0.5 * more.squares) - (less.V - 0.5 * less.squares)  # of the sum of log det S / 2
+            slope[NAMES.index(name)] = -of_S / step
+        return replace(self._without_matrix, slope=slope)
 
     @cached_property
     def _most_nis(self) -> float:
@@ -236,6 +259,11 @@ class InPlaceFits:
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
     series = with_sampling_errors(mask(Series.after(recording, flat), recording, flat), recording, flat)
     return Problem(series, flat, gravity)
+
+
+def _with_noise(problem: Problem, factor: Vector) -> Problem:
+    """Return the problem with the variance of the rates' noise multiplied by a factor (3,)."""
+    return replace(problem, flat=replace(problem.flat, Sigma_omega=problem.flat.Sigma_omega * factor))
 
 
 def _with_errors(problem: Problem, errors: Errors) -> Problem:

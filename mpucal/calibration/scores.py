@@ -34,9 +34,8 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     to_ends = at.to_ends or evaluate(problem, seen, len(free), ends).to_ends
     assert to_ends is not None
     scores = part_scores(problem, seen, len(free), to_ends).moved(minimum.last)
-    away, precision = theta.values()[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
-    left = scores.gradient.sum(0) + scores.flat.gradient + precision * away
-    H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(precision)
+    left = scores.gradient.sum(0) + scores.flat.gradient + prior.gradient(theta, len(free))
+    H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(prior.precision[: len(free)])
     seen_parts = PartScores(scores.gradient[:, free], scores.fisher[:, free][:, :, free], scores.flat)
     return with_times(problem, theta, seen_parts, H[np.ix_(free, free)], left[free])
 

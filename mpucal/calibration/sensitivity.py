@@ -81,7 +81,7 @@ def find_sensitivity(
         found = evaluate(less, theta, SENSITIVE, ends)
         H = found.fisher + np.diag(precision)
         C = inverse(H)
-        step = -C @ (found.gradient + precision * np.append(theta.values() - prior.mean, S))
+        step = -C @ (found.gradient + np.append(prior.gradient(theta), SENSITIVITY_SD**-2 * S))
         before, theta, S = theta, theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
         known, s = inverse(C[HAND:, HAND:]), S.ravel()
         evidence = 0.5 * float(s @ known @ s - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])

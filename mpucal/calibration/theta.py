@@ -116,10 +116,12 @@ class Prior:
     Attributes
     ----------
     mean : (p,) in the order of NAMES. precision : (p,) 1 / variance; 0 where nothing is known.
+    slope : (p,) added to the gradient, where that of V is not 0 in the mean at the true parameters.
     """
 
     mean: Vector
     precision: Vector
+    slope: Vector | float = 0.0
 
     @classmethod
     def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
@@ -144,7 +146,11 @@ class Prior:
         """Precisions (p + 9,) with those of the gyroscope's sensitivity to acceleration, by the data sheet."""
         return np.append(self.precision, np.full(SENSITIVE - HAND, SENSITIVITY_SD**-2))
 
-    def cost(self, theta: Theta) -> float:
-        """Return the sum of precision (x - mean)^2 / 2 at theta, which adds to V."""
+    def cost(self, theta: Theta, parameters: int = HAND) -> float:
+        """Return what adds to V: the sum of precision (x - mean)^2 / 2 + slope (x - mean) over the first parameters."""
         away = theta.values() - self.mean
-        return 0.5 * float(self.precision @ (away * away))
+        return float(np.sum((away * (0.5 * self.precision * away + self.slope))[:parameters]))
+
+    def gradient(self, theta: Theta, parameters: int = HAND) -> Vector:
+        """Return the gradient of `cost` by the first parameters."""
+        return np.asarray((self.precision * (theta.values() - self.mean) + self.slope)[:parameters])

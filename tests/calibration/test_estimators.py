@@ -134,6 +134,16 @@ def test_auto_finds_a_gyroscope_that_is_off_with_right_standard_deviations(ideal
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.3
 
 
+def test_noise_as_large_as_the_rates_makes_no_scale_factor_error():
+    runs = [paper_scenario(seed, turn_s=50.0) for seed in range(12)]  # 7 deg/s, and noise of 2 to 6 deg/s
+    fits = [by(METHODS["imu"], run.recording) for run in runs]
+    perfect = np.eye(3)[np.triu_indices(3)]
+    z = np.array([(fit.K[np.triu_indices(3)] - perfect) / fit.std(*K_NAMES) for fit in fits])
+    assert np.abs(z).max() < 4.0
+    assert (np.abs(z.mean(axis=0)) < 4.0 / np.sqrt(len(runs))).all()
+    assert [by(choose_model, run.recording).model for run in runs[:4]] == ["accel"] * 4
+
+
 # ---- a lever arm
 
 
