@@ -168,13 +168,12 @@ def find_reset(recording: Recording, flat: Flat) -> int | None:
     None is returned where it was not.
     """
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
-    dt = np.diff(recording.t[flat.last :])[:, None]
+    dt, steps, gravity = np.diff(recording.t[flat.last :]), np.diff(acc, axis=0), np.linalg.norm(flat.y)
     with np.errstate(all="ignore"):
-        unseen = cross_rows(rate[1:], acc[:-1])
-        unseen *= dt
-        unseen += np.diff(acc, axis=0)
-        missed = lengths(unseen) / np.linalg.norm(flat.y)
-        for i in np.flatnonzero((missed > LEAST_TURN_RAD) & ~recording.gap[flat.last + 1 :]):
+        missed = (lengths(rate)[1:] * lengths(acc)[:-1] * dt + lengths(steps)) / gravity  # at most
+        far = np.flatnonzero(missed > LEAST_TURN_RAD)
+        missed[far] = lengths(cross_rows(rate[far + 1], acc[far]) * dt[far, None] + steps[far]) / gravity
+        for i in far[(missed[far] > LEAST_TURN_RAD) & ~recording.gap[flat.last + 1 :][far]]:
             around, after = missed[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS + 1], acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
             is_back = np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y)
             if is_back and np.count_nonzero(around > LEAST_TURN_RAD) == 1:

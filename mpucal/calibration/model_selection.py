@@ -131,7 +131,7 @@ class InPlaceFits:
                 if parameters == ACCEL:
                     minimum = self._fit_matrix(minimum, errors) or minimum
                 of_means, step_s = _with_errors(self._thin, errors), 1.0 / self._recording.rate_hz
-                hand = find_hand_effects(of_means, *self._means, minimum, self._without_matrix, step_s)
+                hand = find_hand_effects(of_means, *self._thin_means, minimum, self._without_matrix, step_s)
                 if hand.likely is not None:
                     return f"the data show {hand.likely}"
                 return self._chosen(minimum, errors, hand)
@@ -163,13 +163,13 @@ class InPlaceFits:
         for _ in range(PASSES if erring else 0):
             theta = minimum.theta
             errors = min(ERRORS, key=lambda these: evaluate(_with_errors(self._thin, these), theta, 0).V)
-            minimum = self._search_means(parameters, theta, errors)
+            minimum = self._search(parameters, theta, errors)
         if minimum.nis < HOPELESS_NIS:
             minimum = self._minimum(parameters, minimum, errors)
         return minimum, errors
 
     def _minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
-        """Search on all samples from the end of a rough search; if that did not converge, evaluate without a step.
+        """Search on the samples from the end of a rough search; if that did not converge, evaluate without a step.
 
         Without K, which turns may hardly show, V is so nearly quadratic that its first evaluation mostly is the last.
         """
@@ -189,7 +189,7 @@ class InPlaceFits:
         first = minimise(problem, near.theta, IMU, self._prior(IMU), until=PROMISING, most=1)
         if first.iterations == 0:
             return None
-        rough = self._search_means(IMU, first.theta, errors)
+        rough = self._search(IMU, first.theta, errors)
         imu = self._minimum(IMU, rough if rough.converged else near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
@@ -203,10 +203,10 @@ class InPlaceFits:
         """Return the minimum on means over blocks, found once for each number of parameters."""
         if parameters not in self._roughly:
             begin = self._first if parameters == ACCEL else self._rough(ACCEL).theta
-            self._roughly[parameters] = self._search_means(parameters, begin)
+            self._roughly[parameters] = self._search(parameters, begin)
         return self._roughly[parameters]
 
-    def _search_means(self, parameters: int, begin: Theta, errors: Errors = NO_ERRORS) -> Minimum:
+    def _search(self, parameters: int, begin: Theta, errors: Errors = NO_ERRORS) -> Minimum:
         return minimise(_with_errors(self._thin, errors), begin, parameters, self._prior(parameters), until=ROUGHLY)
 
     def _prior(self, parameters: int) -> Prior:
@@ -234,7 +234,7 @@ class InPlaceFits:
 
         By chance vary the mean over the samples, and the variance that was estimated from those of the flat segment.
         """
-        variance = 2.0 * 3.0 * (1.0 / len(self._problem.series) + 1.0 / self._flat.n)
+        variance = 2.0 * 3.0 * (1.0 / len(self._problem.series) + 1.0 / self._problem.flat.n)
         return 3.0 + MOST_STD * float(np.sqrt(variance))
 
     @cached_property
@@ -243,17 +243,21 @@ class InPlaceFits:
 
     @cached_property
     def _problem(self) -> Problem:
-        return _problem(self._recording, self._flat, self._gravity)
+        # In a faster stream, the noise that a chip's filter leaves hardly changes from sample to sample; it is not white.
+        return _problem(*self._means(5.0 * SEARCH_HZ), self._gravity)
 
     @cached_property
-    def _means(self) -> tuple[Recording, Flat]:
-        """Means over blocks, which lose little where the noise is white."""
-        thin, at = downsampled(self._recording, self._flat, SEARCH_HZ)
-        return thin, flat_statistics(thin, at)
+    def _thin_means(self) -> tuple[Recording, Flat]:
+        return self._means(SEARCH_HZ)
 
     @cached_property
     def _thin(self) -> Problem:
-        return _problem(*self._means, self._gravity)
+        return _problem(*self._thin_means, self._gravity)
+
+    def _means(self, rate_hz: float) -> tuple[Recording, Flat]:
+        """Return means over blocks, which lose little where the noise is white."""
+        means, at = downsampled(self._recording, self._flat, rate_hz)
+        return means, self._flat if means is self._recording else flat_statistics(means, at)
 
 
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:

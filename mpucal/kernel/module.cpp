@@ -260,6 +260,16 @@ NB_MODULE(_kernel, m) {
       "x (n, 3), rotated from each step to the end.");
 
   m.def(
+      "lengths",
+      [](const Array& vectors) {
+        const std::size_t n = vectors.size() / 3;
+        std::vector<double> length(n);
+        lengths(pointer(vectors, 3 * n, "vectors"), n, length.data());
+        return give(std::move(length), {n});
+      },
+      nb::arg("vectors"), "Return the lengths (n,) of vectors (n, 3).");
+
+  m.def(
       "statistics",
       [](const Array& x, const Runs& runs) {
         const std::size_t k = runs.shape(0);

@@ -54,6 +54,11 @@ void turn(const double* phi, const double* x, const std::int64_t* runs, std::siz
   }
 }
 
+void lengths(const double* vectors, std::size_t n, double* length) {
+  for (std::size_t i = 0; i < n; ++i, vectors += 3)
+    length[i] = std::sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1] + vectors[2] * vectors[2]);
+}
+
 void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance) {
   for (std::size_t r = 0; r < count; ++r, mean += 3, variance += 3) {
     const double *first = x + 3 * runs[2 * r], *last = x + 3 * runs[2 * r + 1];

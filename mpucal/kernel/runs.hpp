@@ -1,5 +1,5 @@
-// Functions of runs of samples without a filter: products of rotations, means and variances, moving ones, mean rates,
-// noise, differences of sums, spikes.
+// Functions of runs of samples without a filter: products of rotations, lengths, means and variances, moving ones, mean
+// rates, noise, differences of sums, spikes.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +11,9 @@ namespace mpucal {
 // Where x (n, 3) is given, sums[j][k] (3,) of (runs, 3, 3, 3), row, then j and k, is the sum of F_last-1 ... F_i e_j x_i[k]:
 // vectors that enter on the way, rotated to the end. Without x it is 0.
 void turn(const double* phi, const double* x, const std::int64_t* runs, std::size_t count, double* F, double* sums);
+
+// Lengths (n,) of vectors (n, 3).
+void lengths(const double* vectors, std::size_t n, double* length);
 
 // Means and variances (runs, 3) of x (n, 3) over samples first..last-1 of each run.
 void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance);
