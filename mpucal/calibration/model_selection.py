@@ -243,7 +243,7 @@ class InPlaceFits:
 
     @cached_property
     def _problem(self) -> Problem:
-        # In a faster stream, the noise that a chip's filter leaves hardly changes from sample to sample; it is not white.
+        # In a faster stream, noise that a chip's filter leaves hardly changes from sample to sample: it is not white.
         return _problem(*self._means(5.0 * SEARCH_HZ), self._gravity)
 
     @cached_property
