@@ -14,16 +14,19 @@ from ..rests.flat import Flat
 from ..result.correlation import UPPER
 from .levenberg_marquardt import Minimum
 from .likelihood import evaluate
+from .normal_equations import inverse
 from .parameters import BY_NAME, HAND, PLACES
 from .preprocessing import smoothed_rates
 from .problem import Problem
-from .theta import Prior
+from .rotation import cross_rows
+from .theta import Prior, Theta
 
 K = BY_NAME["K"]
 MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance explains nothing
 RARE_STD = 2.326  # those that chance exceeds in one case of a hundred: enough for parameters that do no harm
 KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
-LEAST_LEVER_M = 1e-3  # the axes of one chip are as far from each other
+LEAST_LEVER_M = 1e-3  # standard deviation of a lever arm that is none: the axes of one chip are as far apart
+SPREAD_S2 = 0.02**2  # standard deviation of a filter's spread: the square of the delay of a chip's slowest one
 
 
 def most_chi2(n: int, deviate: float = MOST_STD) -> float:
@@ -53,59 +56,79 @@ def undetermined(covariance: Vector) -> tuple[str, ...]:
 
 
 class HandEffects(NamedTuple):
-    """Effects of the parameters that only a hand's model estimates on an estimate by another model.
+    """Effects of a lever arm r, a delay tau and the spread of the sensors' filters on an estimate by another model.
 
     Attributes
     ----------
     likely : what of them the data likely show, for a message; None where no other model is needed.
-    shift : (p,) of the estimate, by the likeliest delay tau. covariance : (p, p) that an unknown tau adds to it.
+    shift : (p,) of the estimate, by the likeliest tau and spread. covariance : (p, p) that all of them add to it.
+    spread_s2 : s^2, the spread where the data surely show one, or 0.
     """
 
     likely: str | None
     shift: Vector
     covariance: Vector
+    spread_s2: float
 
 
 def find_hand_effects(
     problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior, step_s: float
 ) -> HandEffects:
-    """Return whether the data likely show a lever arm r, or a delay tau against its prior, and what tau changes.
+    """Return whether the data likely show a lever arm r, or a delay tau against its prior, and what these change.
 
     The statistic of r is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the
-    parameters of the estimate take of them. S^-1 g is the step to r, and to tau likewise.
+    parameters of the estimate take of them. S^-1 g is the step to r, and to tau likewise. The spread is the variance in
+    time [s^2] of the impulse response of a filter, which is that of both sensors.
 
     Parameters
     ----------
     problem : of the recording, whose flat segment is `flat`. minimum : of a model without a lever arm.
     step_s : s, from sample to sample, of the recording before its downsampling.
     """
-    n = len(problem.series)
+    n, theta, series = len(problem.series), minimum.theta, problem.series
     rate, alpha = smoothed_rates(recording, flat)
-    series = replace(
-        problem.series, rate=rate, alpha=alpha, reset=np.full(n, -1.0), jerk=np.zeros(n), r_extra=np.zeros(n)
+    series = replace(series, rate=rate, alpha=alpha, reset=np.full(n, -1.0), jerk=np.zeros(n), r_extra=np.zeros(n))
+    y, omega = by_filter(series.y, rate, alpha, theta)
+    of = theta, HAND
+    less, at, more = (
+        evaluate(replace(problem, series=replace(series, y=series.y - x * y, omega=series.omega - x * omega)), *of)
+        for x in (-SPREAD_S2, 0.0, SPREAD_S2)
     )
-    at = evaluate(replace(problem, series=series), minimum.theta, HAND)
-    others = np.flatnonzero(minimum.free)
-    H = at.fisher[np.ix_(others, others)] + np.diag(prior.precision[others])
-
-    def beside(name: str) -> tuple[Vector, Vector, Vector]:
-        """Return the step, S, and what the parameters take of them."""
-        places = np.arange(HAND)[PLACES[name]]
-        taken = np.linalg.solve(H, at.fisher[np.ix_(others, places)])
-        S = at.fisher[np.ix_(places, places)] - at.fisher[np.ix_(places, others)] @ taken
-        step = -np.linalg.lstsq(S, at.gradient[places] - taken.T @ at.gradient[others], rcond=None)[0]
-        return np.asarray(step), S, np.asarray(taken)
-
-    likely, (r, S, _) = None, beside("r")
-    if r @ S @ r > most_chi2(len(r), RARE_STD) and norm(r) > LEAST_LEVER_M:
+    # The gradient and the Fisher matrix of the estimated parameters, and then of r, tau and the spread.
+    free, effects = np.flatnonzero(minimum.free), np.concatenate([np.arange(HAND)[PLACES[x]] for x in ("r", "tau")])
+    p, lanes = len(free), np.append(free, effects)
+    gradient = np.append(at.gradient[lanes], (more.V - less.V) / (2.0 * SPREAD_S2))
+    across = (more.gradient - less.gradient)[lanes] / (2.0 * SPREAD_S2)
+    curvature = (more.V - 2.0 * at.V + less.V) / SPREAD_S2**2
+    fisher = np.block([[at.fisher[np.ix_(lanes, lanes)], across[:, None]], [across, curvature]])
+    taken = np.linalg.solve(fisher[:p, :p] + np.diag(prior.precision[free]), fisher[:p, p:])
+    S, g = fisher[p:, p:] - fisher[:p, p:].T @ taken, gradient[p:] - taken.T @ gradient[:p]
+    likely, r = None, -np.linalg.lstsq(S[:3, :3], g[:3], rcond=None)[0]
+    if r @ S[:3, :3] @ r > most_chi2(3, RARE_STD) and norm(r) > MOST_STD * LEAST_LEVER_M:
         likely = f"a lever arm of {1e3 * norm(r):.0f} mm"
-    tau, S, taken = beside("tau")
-    information = max(S.item(), np.finfo(np.float64).tiny)  # of rates that never change it is 0, or rounded below that
-    expected, precision = prior.mean[PLACES["tau"]], prior.precision[PLACES["tau"]]
+    information = max(S[3, 3], np.finfo(np.float64).tiny)  # of rates that never change it is 0, or rounded below that
+    tau, expected, precision = -g[3] / information, prior.mean[effects[3]], prior.precision[effects[3]]
     # A rate may be that of the step before its sample, or of the step after.
-    std = math.sqrt(1.0 / information + 1.0 / precision.item() + (0.5 * step_s) ** 2)
-    if abs(tau - expected).item() > MOST_STD * std:
-        likely = f"a delay of {1e3 * tau.item():.0f} ms"
-    variance = 1.0 / (information + precision)
-    shift = -taken @ (variance * (precision * expected + information * tau))
-    return HandEffects(likely, shift, variance * taken @ taken.T)
+    std = math.sqrt(1.0 / information + 1.0 / precision + (0.5 * step_s) ** 2)
+    if abs(tau - expected) > MOST_STD * std:
+        likely = f"a delay of {1e3 * tau:.0f} ms"
+    precisions = np.array([*[LEAST_LEVER_M**-2] * 3, precision, SPREAD_S2**-2])
+    covariance = inverse(S + np.diag(precisions))
+    of_means = (float(np.median(series.dt)) ** 2 - step_s**2) / 12.0  # spread of the downsampling, which is no sensor's
+    x = covariance @ (precisions * [0.0, 0.0, 0.0, expected, of_means] - g)
+    x[4] -= of_means
+    is_filtered = abs(x[4]) > MOST_STD * math.sqrt(covariance[4, 4])
+    by_r = taken[:, :3] @ x[:3]  # an r so short may be none, so that it only widens the uncertainty
+    total = taken @ covariance @ taken.T + np.outer(by_r, by_r)
+    return HandEffects(likely, by_r - taken @ x, total, float(x[4]) if is_filtered else 0.0)
+
+
+def by_filter(y: Vector, rate: Vector, alpha: Vector, theta: Theta) -> tuple[Vector, Vector]:
+    """Return changes (n, 3) of readings y (n, 3) and of rates by the same filter, of unit spread, in both sensors.
+
+    To second order, a filter adds half of the second derivative to what it delays: of gravity s in the body frame, that
+    is omega x (omega x s) - alpha x s. The filtered rates lead to a body that is turned by alpha / 2, which explains
+    the second term, if -omega x alpha / 2 is taken from them: turns about several axes do not commute.
+    """
+    s = (y - theta.b_a) @ theta.inverse.T
+    return 0.5 * cross_rows(rate, cross_rows(rate, s)) @ theta.D.T, -0.5 * cross_rows(rate, alpha)

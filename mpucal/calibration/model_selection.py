@@ -19,13 +19,14 @@ from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import PASSES, HandFit, fit_hand
-from .hypothesis_tests import MOST_STD, WALD_99, HandEffects, find_hand_effects, undetermined, wald
+from .hypothesis_tests import MOST_STD, WALD_99, HandEffects, by_filter, find_hand_effects, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import LAST, MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
 from .parameters import ACCEL, IMU, NAMES
+from .preprocessing import smoothed_rates
 from .problem import Problem, Series
 from .rotation import lengths
 from .sampling import with_sampling_errors
@@ -114,8 +115,8 @@ def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoic
 class InPlaceFits:
     """Fits of a sensor that turns in place, by the exact filter, to one recording."""
 
-    def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
-        self._recording, self._flat, self._gravity = recording, flat, gravity
+    def __init__(self, recording: Recording, flat: Flat, gravity: float, unfiltered: bool = False) -> None:
+        self._recording, self._flat, self._gravity, self._unfiltered = recording, flat, gravity, unfiltered
         self._without_matrix = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
@@ -132,10 +133,21 @@ class InPlaceFits:
                     minimum = self._fit_matrix(minimum, errors) or minimum
                 of_means, step_s = _with_errors(self._thin, errors), 1.0 / self._recording.rate_hz
                 hand = find_hand_effects(of_means, *self._thin_means, minimum, self._without_matrix, step_s)
+                if hand.spread_s2 and not self._unfiltered:
+                    return self._without_filter(hand.spread_s2, minimum.theta).choose()
                 if hand.likely is not None:
                     return f"the data show {hand.likely}"
                 return self._chosen(minimum, errors, hand)
         return f"white noise does not explain the data (innovations {least:.0f}, expected 3)"
+
+    def _without_filter(self, spread_s2: float, theta: Theta) -> InPlaceFits:
+        """Return the fits without what the sensors' filters take of a gravity that turns."""
+        recording, last = self._recording, self._flat.last
+        y, omega = by_filter(recording.acc[last:], *smoothed_rates(recording, self._flat), theta)
+        acc, gyr = recording.acc.copy(), recording.gyr.copy()
+        acc[last:] -= spread_s2 * y
+        gyr[last:] -= spread_s2 * omega
+        return InPlaceFits(replace(recording, acc=acc, gyr=gyr), self._flat, self._gravity, unfiltered=True)
 
     def _chosen(self, minimum: Minimum, errors: Errors, hand: HandEffects) -> ModelChoice:
         perfect = len(minimum.free) == ACCEL
