@@ -54,7 +54,6 @@ class Errors(NamedTuple):
 
 NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
-PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
 class ModelChoice(NamedTuple):
@@ -198,7 +197,8 @@ class InPlaceFits:
         problem = _with_errors(self._problem, errors)
         if not near.converged:
             return None
-        first = minimise(problem, near.theta, IMU, self._prior(IMU), until=PROMISING, most=1)
+        # Twice the decrement estimates the statistic.
+        first = minimise(problem, near.theta, IMU, self._prior(IMU), until=WALD_99 / 3.0, most=1)
         if first.iterations == 0:
             return None
         rough = self._search(IMU, first.theta, errors)

@@ -245,12 +245,11 @@ def test_a_delay_between_the_sensors_is_no_turn_of_the_mount(delay_ms, model):
 
 @pytest.mark.parametrize("kernel", [np.exp(-np.arange(400) / 32.0), np.ones(100)], ids=["5 Hz", "mean of 0.1 s"])
 @pytest.mark.parametrize("rates", [(0.7, 0.45), (1.5, 1.1)])
-def test_what_a_filter_takes_of_a_gravity_that_turns_is_no_scale_factor(rates, kernel):
+def test_a_filter_of_both_sensors_is_no_scale_factor(rates, kernel):
     """Filter both sensors, as a chip's filter of 5 Hz or a person's mean does: gravity that turns loses 0.1 to 1 %."""
     _, acc, gyr = gimbal(70, *rates)
-    acc, gyr = (
-        np.stack([np.convolve(column, kernel / kernel.sum(), "valid")[::5] for column in x.T], axis=1) for x in (acc, gyr)
-    )
+    kernel = kernel / kernel.sum()
+    acc, gyr = (np.stack([np.convolve(of, kernel, "valid")[::5] for of in x.T], axis=1) for x in (acc, gyr))
     z = z_of_noisy(acc, gyr, ("accel", "imu"))
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
     assert np.abs(z).max() < 4.0
