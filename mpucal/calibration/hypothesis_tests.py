@@ -13,7 +13,7 @@ from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..result.correlation import UPPER
 from .levenberg_marquardt import Minimum
-from .likelihood import evaluate
+from .likelihood import Evaluation, evaluate
 from .normal_equations import inverse
 from .parameters import BY_NAME, HAND, PLACES
 from .preprocessing import smoothed_rates
@@ -85,42 +85,52 @@ def find_hand_effects(
     problem : of the recording, whose flat segment is `flat`. minimum : of a model without a lever arm.
     step_s : s, from sample to sample, of the recording before its downsampling.
     """
-    n, theta, series = len(problem.series), minimum.theta, problem.series
-    rate, alpha = smoothed_rates(recording, flat)
-    series = replace(series, rate=rate, alpha=alpha, reset=np.full(n, -1.0), jerk=np.zeros(n), r_extra=np.zeros(n))
-    y, omega = by_filter(series.y, rate, alpha, theta)
-    of = theta, HAND
-    less, at, more = (
-        evaluate(replace(problem, series=replace(series, y=series.y - x * y, omega=series.omega - x * omega)), *of)
-        for x in (-SPREAD_S2, 0.0, SPREAD_S2)
-    )
-    # The gradient and the Fisher matrix of the estimated parameters, and then of r, tau and the spread.
-    free, effects = np.flatnonzero(minimum.free), np.concatenate([np.arange(HAND)[PLACES[x]] for x in ("r", "tau")])
-    p, lanes = len(free), np.append(free, effects)
-    gradient = np.append(at.gradient[lanes], (more.V - less.V) / (2.0 * SPREAD_S2))
-    across = (more.gradient - less.gradient)[lanes] / (2.0 * SPREAD_S2)
-    curvature = (more.V - 2.0 * at.V + less.V) / SPREAD_S2**2
-    fisher = np.block([[at.fisher[np.ix_(lanes, lanes)], across[:, None]], [across, curvature]])
-    taken = np.linalg.solve(fisher[:p, :p] + np.diag(prior.precision[free]), fisher[:p, p:])
-    S, g = fisher[p:, p:] - fisher[:p, p:].T @ taken, gradient[p:] - taken.T @ gradient[:p]
+    S, g, taken = _weigh_effects(problem, smoothed_rates(recording, flat), minimum, prior)
     likely, r = None, -np.linalg.lstsq(S[:3, :3], g[:3], rcond=None)[0]
     if r @ S[:3, :3] @ r > most_chi2(3, RARE_STD) and norm(r) > MOST_STD * LEAST_LEVER_M:
         likely = f"a lever arm of {1e3 * norm(r):.0f} mm"
     information = max(S[3, 3], np.finfo(np.float64).tiny)  # of rates that never change it is 0, or rounded below that
-    tau, expected, precision = -g[3] / information, prior.mean[effects[3]], prior.precision[effects[3]]
+    tau, expected, precision = -g[3] / information, *(x[PLACES["tau"]].item() for x in (prior.mean, prior.precision))
     # A rate may be that of the step before its sample, or of the step after.
     std = math.sqrt(1.0 / information + 1.0 / precision + (0.5 * step_s) ** 2)
     if abs(tau - expected) > MOST_STD * std:
         likely = f"a delay of {1e3 * tau:.0f} ms"
     precisions = np.array([*[LEAST_LEVER_M**-2] * 3, precision, SPREAD_S2**-2])
     covariance = inverse(S + np.diag(precisions))
-    of_means = (float(np.median(series.dt)) ** 2 - step_s**2) / 12.0  # spread of the downsampling, which is no sensor's
+    of_means = (float(np.median(problem.series.dt)) ** 2 - step_s**2) / 12.0  # spread of means, which is no sensor's
     x = covariance @ (precisions * [0.0, 0.0, 0.0, expected, of_means] - g)
     x[4] -= of_means
     is_filtered = abs(x[4]) > MOST_STD * math.sqrt(covariance[4, 4])
     by_r = taken[:, :3] @ x[:3]  # an r so short may be none, so that it only widens the uncertainty
     total = taken @ covariance @ taken.T + np.outer(by_r, by_r)
     return HandEffects(likely, by_r - taken @ x, total, float(x[4]) if is_filtered else 0.0)
+
+
+def _weigh_effects(
+    problem: Problem, rates: tuple[Vector, Vector], minimum: Minimum, prior: Prior
+) -> tuple[Vector, Vector, Vector]:
+    """Return information (5, 5) and gradient (5,) by r, tau and spread, less what the p estimated parameters take.
+
+    The third is what they take (p, 5). rates : rate and angular acceleration (n, 3), smoothed.
+    """
+    n, theta, series = len(problem.series), minimum.theta, problem.series
+    still = {"reset": np.full(n, -1.0), "jerk": np.zeros(n), "r_extra": np.zeros(n)}
+    y, omega = by_filter(series.y, *rates, theta)
+
+    def filtered(spread: float) -> Evaluation:
+        moved = {"y": series.y - spread * y, "omega": series.omega - spread * omega}
+        of_spread = replace(series, rate=rates[0], alpha=rates[1], **still, **moved)
+        return evaluate(replace(problem, series=of_spread), theta, HAND)
+
+    less, at, more = map(filtered, (-SPREAD_S2, 0.0, SPREAD_S2))
+    free, of_hand = np.flatnonzero(minimum.free), np.arange(HAND)
+    p, lanes = len(free), np.concatenate([free, of_hand[PLACES["r"]], of_hand[PLACES["tau"]]])
+    gradient = np.append(at.gradient[lanes], (more.V - less.V) / (2.0 * SPREAD_S2))
+    across = (more.gradient - less.gradient)[lanes] / (2.0 * SPREAD_S2)
+    curvature = (more.V - 2.0 * at.V + less.V) / SPREAD_S2**2
+    fisher = np.block([[at.fisher[np.ix_(lanes, lanes)], across[:, None]], [across, curvature]])
+    taken = np.linalg.solve(fisher[:p, :p] + np.diag(prior.precision[free]), fisher[:p, p:])
+    return fisher[p:, p:] - fisher[:p, p:].T @ taken, gradient[p:] - taken.T @ gradient[:p], taken
 
 
 def by_filter(y: Vector, rate: Vector, alpha: Vector, theta: Theta) -> tuple[Vector, Vector]:
