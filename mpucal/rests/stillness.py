@@ -130,21 +130,22 @@ class Detector:
 
     def shares(self, windows: Spreads) -> Shares:
         """Return the motion in each window, as shares of the limits."""
-        acc_limit, gyr_limit = self._most_sd
         vibration = math.sqrt(self._limits.vibration) * windows.acc_noise
         return Shares(
-            windows.acc_sd / np.maximum(acc_limit, vibration),
-            windows.gyr_sd / gyr_limit,
+            windows.acc_sd / np.maximum(self._most_acc_sd, vibration),
+            windows.gyr_sd / self._most_gyr_sd,
             np.abs(windows.gyr - self._bias) / self._most_rate,
         )
 
     @property
-    def _most_sd(self) -> tuple[Vector, Vector]:
-        """Limits (3,) of the standard deviations for this sensor."""
-        return (
-            np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
-            np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S)),
-        )
+    def _most_acc_sd(self) -> Vector:
+        """Limits (3,) of the accelerometer's standard deviations for this sensor."""
+        return np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2))
+
+    @property
+    def _most_gyr_sd(self) -> Vector:
+        """Limits (3,) of the gyroscope's standard deviations for this sensor."""
+        return np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S))
 
     @property
     def seconds(self) -> float:
@@ -225,9 +226,10 @@ class Detector:
             return "samples were lost"
         if turning.max() > 1.0:
             return _turned(window.gyr - self._bias)
-        if gyr.max() > max(acc.max(), 1.0):
+        most = acc.max()
+        if gyr.max() > max(most, 1.0):
             return _turned(window.gyr_sd * np.where(gyr == gyr.max(), 1.0, 0.0))
-        return _shook(window.acc_sd, acc) if acc.max() > 1.0 else ""
+        return _shook(window.acc_sd, acc) if most > 1.0 else ""
 
     def _stepped(self, window: Window) -> str:
         """Raise the level; return the motion between the run so far and the window, as text; empty if there is none."""
@@ -238,13 +240,14 @@ class Detector:
         # Two means differ by a slow tremor, up to the standard deviation, and by noise, more so if samples are few.
         share = max(1.0, CHANCE * math.sqrt((1.0 + 1.0 / self._count) / window.count))
         # A spike, or vibration, spreads a window further, but its mean hardly.
-        acc_sd = np.minimum(window.acc_sd, self._most_sd[0])
+        acc_sd = np.minimum(window.acc_sd, self._most_acc_sd)
         acc_ratio = np.abs(acc_step) / (self._limits.acc_step + share * acc_sd)
         gyr_ratio = np.abs(gyr_step) / (self._limits.gyro_step + share * window.gyr_sd)
-        self.level = float(max(self.level, acc_ratio.max(), gyr_ratio.max()))
-        if max(acc_ratio.max(), gyr_ratio.max()) <= 1.0:
+        acc_most, gyr_most = float(acc_ratio.max()), float(gyr_ratio.max())
+        self.level = max(self.level, acc_most, gyr_most)
+        if max(acc_most, gyr_most) <= 1.0:
             return ""
-        if gyr_ratio.max() > acc_ratio.max():
+        if gyr_most > acc_most:
             return _turned(gyr_step)
         axis = int(acc_ratio.argmax())
         return f"acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"

@@ -138,7 +138,8 @@ def _window(samples: Samples, first: int, last: int, length_s: float, spread: bo
     span = _span(samples, first, last, length_s)
     if spread:
         return of_rows(acc, gyr, *span[:3])
-    return Window(gyr.mean(0), UNKNOWN, UNKNOWN, UNKNOWN, acc.mean(0), *span)
+    n = last - first  # a sum is divided in half the time of mean
+    return Window(np.add.reduce(gyr) / n, UNKNOWN, UNKNOWN, UNKNOWN, np.add.reduce(acc) / n, *span)
 
 
 def _span(samples: Samples, first: int, last: int, length_s: float) -> tuple[float, float, bool, int]:
