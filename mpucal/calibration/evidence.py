@@ -128,19 +128,23 @@ class Evidence:
         return float(np.median(self.magnitude))
 
     @cached_property
-    def magnitude_errors(self) -> tuple[float, float]:
-        """Medians [m/s^2], while the board turns, of | |a| - g | and of the second difference of |a| - g over 10 ms.
+    def magnitude_errors(self) -> tuple[float, float, float]:
+        """Medians, while the board turns, of | |a| - g | [m/s^2] and of second differences over 10 ms.
 
-        A hand's own acceleration changes much within 10 ms; in smoothed readings it does not.
+        These are of |a| - g [m/s^2], and of the rates [rad/s]. In a hand both are large, on a machine both are small,
+        and in smoothed readings only the first is small.
         """
         r, a = self.recording, self.calibrated
         if a is None or self.flat is None:
-            return 0.0, np.inf
+            return 0.0, np.inf, 0.0
         n = max(round(BLOCK_S * r.rate_hz), 1)
-        turns = lengths(block_means(r.gyr, n) - self.flat.b_omega)[1:-1] > MOVING_RAD_S
-        size = lengths(block_means(a, n)) - self.gravity
-        away, bent = np.abs(size[1:-1])[turns], np.abs(np.diff(size, n=2))[turns]
-        return (float(np.median(away)), float(np.median(bent))) if len(away) else (0.0, np.inf)
+        rate, size = block_means(r.gyr, n) - self.flat.b_omega, lengths(block_means(a, n)) - self.gravity
+        turns = lengths(rate)[1:-1] > MOVING_RAD_S
+        if not turns.any():
+            return 0.0, np.inf, 0.0
+        of_each = size[1:-1], np.diff(size, n=2), lengths(np.diff(rate, n=2, axis=0))
+        away, bent, of_rates = (float(np.median(np.abs(each[turns]))) for each in of_each)
+        return away, bent, of_rates
 
     @cached_property
     def gravity_moved(self) -> float:

@@ -11,11 +11,11 @@ from ..data import ACCEL_RANGES_G, GAP_INTERVALS, GYRO_RANGES_DPS, STANDARD_GRAV
 from ..kernel import _kernel
 from ..origin import Origin
 from ..rests.flat import Flat
-from ..rests.intervals import true_runs
+from ..rests.intervals import statistics, true_runs
 from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .problem import Series
-from .rotation import cross_rows, lengths, shortest_turns, units
+from .rotation import cross_rows, lengths, shortest_turns, turned, units
 from .words import ODDS
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
@@ -75,7 +75,7 @@ def with_masks(recording: Recording) -> Recording:
         recording,
         gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
-        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges, may_stay=True)),
+        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges, recording)),
     )
     for run in stuck_readings(marked, "gyr"):
         marked.gap[run.first : run.last] = True
@@ -85,6 +85,32 @@ def with_masks(recording: Recording) -> Recording:
         if value in (column.min(), column.max()) and np.count_nonzero(column == value) > last - first:
             marked.acc_clipped[first - 1 : last - 1] = True
     return replace(marked, gyr=_beyond_range(replace(marked, gyr=_without_spikes(recording))))
+
+
+def _is_steady(recording: Recording, at: Mask) -> bool:
+    """Return True if the rates explain how gravity turned in most of the long runs, shorter pauses among them."""
+    runs, half_second = true_runs(at), WINDOW_S * recording.rate_hz
+    apart = np.flatnonzero(runs[1:, 0] - runs[:-1, 1] > half_second) + 1
+    ends = [(near[0, 0], near[-1, 1]) for near in np.split(runs, apart)]
+    explained = [_explains_gravity(recording, first, last) for first, last in ends if last - first >= half_second]
+    return 2 * sum(explained) > len(explained)
+
+
+def _explains_gravity(recording: Recording, first: int, last: int) -> bool:
+    """Return True if the rates of samples first..last-1, of half a second or more, turn gravity as it turned.
+
+    So do coarse rates that repeat as a machine turns at a constant rate, and no clipped or frozen ones. The bias is the
+    mean rate of the recording's first half second. Errors of scale and axes may miss a tenth of the turn.
+    """
+    n = max(round(WINDOW_S * recording.rate_hz), 2)
+    pieces = min(max((last - first) // (2 * n), 1), SHORTEST_RUN)
+    at = np.linspace(first, last - 1, pieces + 1).astype(np.intp)
+    around = np.clip(np.stack([at - n // 8, at + n // 8 + 1], axis=1), 0, len(recording))
+    up = units(statistics(recording.acc, around)[0])
+    steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - recording.gyr[:n].mean(axis=0))
+    steps = steps[first : at[-1] + 1]
+    carried = turned(-steps, np.stack([at[:-1], at[1:]], axis=1) + 1 - first) @ up[:-1, :, None]
+    return bool(lengths(carried[:, :, 0] - up[1:]).sum() < 0.1 * lengths(steps).sum())
 
 
 def _beyond_range(recording: Recording) -> Vector:
@@ -290,6 +316,8 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
             if sensor == "gyr":
                 changed = np.ptp(values[first : last + 1], axis=0).max()
                 is_turning |= max(changed, abs(column[first] - column[0])) > MOVING_RAD_S
+                is_long = last - first >= WINDOW_S * recording.rate_hz
+                is_turning &= not (is_long and _explains_gravity(recording, first, last))
             if is_turning:
                 stuck.append(Stuck(axis, first + 1, last + 2))
     return stuck
@@ -304,15 +332,15 @@ def _longest_by_chance(same: Mask) -> float:
     return max(-float(np.log(ODDS * len(same)) / np.log(share)), SHORTEST_RUN)
 
 
-def _at_the_rail(values: Vector, ranges: Vector, may_stay: bool = False) -> Mask:
+def _at_the_rail(values: Vector, ranges: Vector, turned_by: Recording | None = None) -> Mask:
     """Return (n,) True where an axis is clipped: it repeats its largest or smallest value.
 
     At the end of one of `ranges` two samples are enough. Elsewhere a range is not known, and the value must repeat more
     often than by chance. Clipped readings are equal to the largest value more often than they are just below it; at a
     slow peak of coarse readings it is the other way round.
 
-    may_stay : the values may stay the same without being clipped, as the rate of a machine does; then one whose range
-        is not known is clipped only far from the others.
+    turned_by : recording whose rates these are. They may stay the same without being clipped, as a machine's do. At
+        the end of an unknown range they are far from the others, and mostly do not explain how gravity turned.
     """
     clipped = np.zeros(len(values), bool)
     for column in np.ascontiguousarray(values.T):
@@ -323,7 +351,10 @@ def _at_the_rail(values: Vector, ranges: Vector, may_stay: bool = False) -> Mask
             is_cut_off = 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= tolerance)
             known = is_cut_off and bool((np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE).any())
             if not known and np.count_nonzero(at[1:] & at[:-1]) >= _longest_by_chance(np.diff(column) == 0.0):
-                known = _is_motion(column, rail) if may_stay else is_cut_off and _is_noisy(column, tolerance)
+                if turned_by is None:
+                    known = is_cut_off and _is_noisy(column, tolerance)
+                else:
+                    known = _is_motion(column, rail) and not _is_steady(turned_by, at)
             if known:
                 clipped |= at
     return clipped

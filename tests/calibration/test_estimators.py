@@ -255,6 +255,16 @@ def test_a_filter_of_both_sensors_is_no_scale_factor(rates, kernel):
     assert np.abs(z).max() < 4.0
 
 
+def test_a_quiet_sensor_on_the_arm_of_a_machine_is_raw():
+    """Turn a sensor of a thirtieth of the noise 10 cm beside the pivot: nothing shakes it as a hand does."""
+    _, acc, gyr = gimbal(70, 0.7, 0.45)
+    r, alpha = np.array([0.06, -0.08, 0.02]), np.gradient(gyr, 1e-3, axis=0)
+    acc = (acc + (np.cross(alpha, r) + np.cross(gyr, np.cross(gyr, r))) @ SENSOR[0].T)[::5]
+    rng = np.random.default_rng(0)
+    readings = acc + rng.normal(0.0, 1e-4, acc.shape), gyr[::5] + rng.normal(0.0, 1e-5, acc.shape)
+    assert calibrate(Recording.from_arrays(5e-3 * np.arange(len(acc)), *readings), "auto", G).verdict == "good"
+
+
 @pytest.mark.parametrize("rates", [(0.3, 0.2), (0.5, 0.35), (0.7, 0.5)])
 def test_a_gyroscope_that_warms_on_a_machine_that_never_rests_is_no_turn_of_the_mount(rates):
     """Remove the drift, which a mount and K may have caused in part where the machine turns evenly."""

@@ -8,11 +8,12 @@ import pytest
 from mpucal.calibration import calibrate
 from mpucal.calibration.masks import ACC_RANGES, GYRO_RANGES, mask, with_masks
 from mpucal.calibration.problem import Series
-from mpucal.calibration.rotation import rotation
+from mpucal.calibration.rotation import rotation, units
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.windows import noise_variance
 from tools.lab.judge import judged, sph_rms
+from tools.lab.scenarios.body import attitudes, specific_force
 
 
 def noise(n=1000, seed=0, **changes):
@@ -249,3 +250,19 @@ def test_short_gaps_cost_little(hand, pick):
     assert sph_rms(truth, found.D, found.b_a) < 2.0 * sph_rms(truth, whole.D, whole.b_a)
     off = np.abs(np.append((found.D - truth.D) / found.D_std, (found.b_a - truth.b_a) / found.b_a_std))
     assert off.max() < 4.0
+
+
+@pytest.mark.parametrize("frozen", [False, True], ids=["even", "frozen"])
+def test_coarse_rates_that_repeat_as_a_machine_turns_evenly_are_neither_clipped_nor_frozen(frozen):
+    """Turn at 30 deg/s about six axes, with steps of 0.06 deg/s above the noise; a gyroscope that froze is found."""
+    axes = units(np.array([[1.0, 0, 0], [0, 1, 0], [1, 1, 0], [0, -1, 0], [1, 0, 1], [0, 1, 1]]))
+    omega = np.repeat(np.vstack([np.zeros(3), np.radians(30.0) * axes]), 1000, axis=0)
+    rng = np.random.default_rng(0)
+    acc = specific_force(attitudes(omega, 0.01), 9.8, np.zeros(3)) + rng.normal(0.0, 0.02, omega.shape)
+    step = np.radians(0.06)
+    gyr = step * np.rint((omega + rng.normal(0.01, 0.1 * step, omega.shape)) / step)
+    if frozen:
+        gyr[5500:] = gyr[1500]
+    marked = with_masks(Recording.from_arrays(0.01 * np.arange(len(acc)), acc, gyr))
+    assert not marked.gyr_clipped.any()
+    assert marked.gap[5600:].all() == marked.gap.any() == frozen
