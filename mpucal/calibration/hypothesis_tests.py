@@ -62,7 +62,7 @@ class HandEffects(NamedTuple):
     ----------
     likely : what of them the data likely show, for a message; None where no other model is needed.
     shift : (p,) of the estimate, by the likeliest tau and spread. covariance : (p, p) that all of them add to it.
-    spread_s2 : s^2, the spread where the data surely show one, or 0.
+    spread_s2 : s^2, the spread where the data surely show one that is longer than a step of the samples, or 0.
     """
 
     likely: str | None
@@ -100,7 +100,7 @@ def find_hand_effects(
     of_means = (float(np.median(problem.series.dt)) ** 2 - step_s**2) / 12.0  # spread of means, which is no sensor's
     x = covariance @ (precisions * [0.0, 0.0, 0.0, expected, of_means] - g)
     x[4] -= of_means
-    is_filtered = abs(x[4]) > MOST_STD * math.sqrt(covariance[4, 4])
+    is_filtered = x[4] > max(MOST_STD * math.sqrt(covariance[4, 4]), step_s**2)  # less may be an error of sampling
     by_r = taken[:, :3] @ x[:3]  # an r so short may be none, so that it only widens the uncertainty
     total = taken @ covariance @ taken.T + np.outer(by_r, by_r)
     return HandEffects(likely, by_r - taken @ x, total, float(x[4]) if is_filtered else 0.0)

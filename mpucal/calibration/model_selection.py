@@ -114,8 +114,10 @@ def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoic
 class InPlaceFits:
     """Fits of a sensor that turns in place, by the exact filter, to one recording."""
 
-    def __init__(self, recording: Recording, flat: Flat, gravity: float, unfiltered: bool = False) -> None:
-        self._recording, self._flat, self._gravity, self._unfiltered = recording, flat, gravity, unfiltered
+    def __init__(
+        self, recording: Recording, flat: Flat, gravity: float, filtered: tuple[float, Theta] | None = None
+    ) -> None:
+        self._recording, self._flat, self._gravity, self._filtered = recording, flat, gravity, filtered
         self._without_matrix = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
@@ -132,21 +134,13 @@ class InPlaceFits:
                     minimum = self._fit_matrix(minimum, errors) or minimum
                 of_means, step_s = _with_errors(self._thin, errors), 1.0 / self._recording.rate_hz
                 hand = find_hand_effects(of_means, *self._thin_means, minimum, self._without_matrix, step_s)
-                if hand.spread_s2 and not self._unfiltered:
-                    return self._without_filter(hand.spread_s2, minimum.theta).choose()
+                if hand.spread_s2 and self._filtered is None:
+                    filtered = hand.spread_s2, minimum.theta
+                    return InPlaceFits(self._recording, self._flat, self._gravity, filtered).choose()
                 if hand.likely is not None:
                     return f"the data show {hand.likely}"
                 return self._chosen(minimum, errors, hand)
         return f"white noise does not explain the data (innovations {least:.0f}, expected 3)"
-
-    def _without_filter(self, spread_s2: float, theta: Theta) -> InPlaceFits:
-        """Return the fits without what the sensors' filters take of a gravity that turns."""
-        recording, last = self._recording, self._flat.last
-        y, omega = by_filter(recording.acc[last:], *smoothed_rates(recording, self._flat), theta)
-        acc, gyr = recording.acc.copy(), recording.gyr.copy()
-        acc[last:] -= spread_s2 * y
-        gyr[last:] -= spread_s2 * omega
-        return InPlaceFits(replace(recording, acc=acc, gyr=gyr), self._flat, self._gravity, unfiltered=True)
 
     def _chosen(self, minimum: Minimum, errors: Errors, hand: HandEffects) -> ModelChoice:
         perfect = len(minimum.free) == ACCEL
@@ -256,7 +250,7 @@ class InPlaceFits:
     @cached_property
     def _problem(self) -> Problem:
         # In a faster stream, noise that a chip's filter leaves hardly changes from sample to sample: it is not white.
-        return _problem(*self._means(5.0 * SEARCH_HZ), self._gravity)
+        return self._unfiltered(*self._means(5.0 * SEARCH_HZ))
 
     @cached_property
     def _thin_means(self) -> tuple[Recording, Flat]:
@@ -264,7 +258,18 @@ class InPlaceFits:
 
     @cached_property
     def _thin(self) -> Problem:
-        return _problem(*self._thin_means, self._gravity)
+        return self._unfiltered(*self._thin_means)
+
+    def _unfiltered(self, recording: Recording, flat: Flat) -> Problem:
+        """Return the problem without what the sensors' filters took of a gravity that turned, if that is known."""
+        problem = _problem(recording, flat, self._gravity)
+        if self._filtered is None:
+            return problem
+        (spread_s2, theta), series = self._filtered, problem.series
+        y, omega = by_filter(series.y, *smoothed_rates(recording, flat), theta)
+        return replace(
+            problem, series=replace(series, y=series.y - spread_s2 * y, omega=series.omega - spread_s2 * omega)
+        )
 
     def _means(self, rate_hz: float) -> tuple[Recording, Flat]:
         """Return means over blocks, which lose little where the noise is white."""
