@@ -87,32 +87,6 @@ def with_masks(recording: Recording) -> Recording:
     return replace(marked, gyr=_beyond_range(replace(marked, gyr=_without_spikes(recording))))
 
 
-def _is_steady(recording: Recording, at: Mask) -> bool:
-    """Return True if the rates explain how gravity turned in most of the long runs, shorter pauses among them."""
-    runs, half_second = true_runs(at), WINDOW_S * recording.rate_hz
-    apart = np.flatnonzero(runs[1:, 0] - runs[:-1, 1] > half_second) + 1
-    ends = [(near[0, 0], near[-1, 1]) for near in np.split(runs, apart)]
-    explained = [_explains_gravity(recording, first, last) for first, last in ends if last - first >= half_second]
-    return 2 * sum(explained) > len(explained)
-
-
-def _explains_gravity(recording: Recording, first: int, last: int) -> bool:
-    """Return True if the rates of samples first..last-1, of half a second or more, turn gravity as it turned.
-
-    So do coarse rates that repeat as a machine turns at a constant rate, and no clipped or frozen ones. The bias is the
-    mean rate of the recording's first half second. Errors of scale and axes may miss a tenth of the turn.
-    """
-    n = max(round(WINDOW_S * recording.rate_hz), 2)
-    pieces = min(max((last - first) // (2 * n), 1), SHORTEST_RUN)
-    at = np.linspace(first, last - 1, pieces + 1).astype(np.intp)
-    around = np.clip(np.stack([at - n // 8, at + n // 8 + 1], axis=1), 0, len(recording))
-    up = units(statistics(recording.acc, around)[0])
-    steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - recording.gyr[:n].mean(axis=0))
-    steps = steps[first : at[-1] + 1]
-    carried = turned(-steps, np.stack([at[:-1], at[1:]], axis=1) + 1 - first) @ up[:-1, :, None]
-    return bool(lengths(carried[:, :, 0] - up[1:]).sum() < 0.1 * lengths(steps).sum())
-
-
 def _beyond_range(recording: Recording) -> Vector:
     """Return the rates (n, 3), short runs of clipped ones replaced by what the slopes on both sides suggest."""
     gyr = recording.gyr.copy()
@@ -367,6 +341,32 @@ def _is_motion(column: Vector, value: float) -> bool:
     """
     median = np.median(column)
     return bool(value != column[0] and abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)
+
+
+def _is_steady(recording: Recording, at: Mask) -> bool:
+    """Return True if the rates explain how gravity turned in most of the long runs, shorter pauses among them."""
+    runs, half_second = true_runs(at), WINDOW_S * recording.rate_hz
+    apart = np.flatnonzero(runs[1:, 0] - runs[:-1, 1] > half_second) + 1
+    ends = [(near[0, 0], near[-1, 1]) for near in np.split(runs, apart)]
+    explained = [_explains_gravity(recording, first, last) for first, last in ends if last - first >= half_second]
+    return 2 * sum(explained) > len(explained)
+
+
+def _explains_gravity(recording: Recording, first: int, last: int) -> bool:
+    """Return True if the rates of samples first..last-1, of half a second or more, turn gravity as it turned.
+
+    So do coarse rates that repeat as a machine turns at a constant rate, and no clipped or frozen ones. The bias is the
+    mean rate of the recording's first half second. Errors of scale and axes may miss a tenth of the turn.
+    """
+    n = max(round(WINDOW_S * recording.rate_hz), 2)
+    pieces = min(max((last - first) // (2 * n), 1), SHORTEST_RUN)
+    at = np.linspace(first, last - 1, pieces + 1).astype(np.intp)
+    around = np.clip(np.stack([at - n // 8, at + n // 8 + 1], axis=1), 0, len(recording))
+    up = units(statistics(recording.acc, around)[0])
+    steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - recording.gyr[:n].mean(axis=0))
+    steps = steps[first : at[-1] + 1]
+    carried = turned(-steps, np.stack([at[:-1], at[1:]], axis=1) + 1 - first) @ up[:-1, :, None]
+    return bool(lengths(carried[:, :, 0] - up[1:]).sum() < 0.1 * lengths(steps).sum())
 
 
 def _is_noisy(column: Vector, tolerance: float) -> bool:
