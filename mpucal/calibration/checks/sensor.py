@@ -10,6 +10,7 @@ import numpy as np
 from ...data import MOST_CLOCK_PPM, Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
+from ...rests.windows import WINDOW_S
 from ...result.correlation import UPPER
 from ...result.error_model import nearest_rotation, sensor_axes
 from ..evidence import Evidence, once
@@ -159,6 +160,7 @@ def sensors_lag(e: Evidence) -> Reason | None:
     # The prior draws the estimate towards the filters' delay: remove it, to have what the data alone say.
     data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
     lag_s = filters_s + (e.estimate.delay_s - filters_s) / data if data > 0.0 else 0.0
-    if not data > 0.0 or abs(lag_s) < max(LAG_S, MOST_STD * std / data**0.5):
+    # Rates change within a longer time: what looks like such a delay has another cause.
+    if not data > 0.0 or not max(LAG_S, MOST_STD * std / data**0.5) <= abs(lag_s) < WINDOW_S:
         return None
     return reason("clock_off", "apart", lag=1e3 * abs(lag_s), how="lags behind" if lag_s > 0 else "runs ahead of")
