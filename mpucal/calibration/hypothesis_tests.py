@@ -25,7 +25,7 @@ K = BY_NAME["K"]
 MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance explains nothing
 RARE_STD = 2.326  # those that chance exceeds in one case of a hundred: enough for parameters that do no harm
 KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
-LEAST_LEVER_M = 1e-3  # standard deviation of a lever arm that is none: the axes of one chip are as far apart
+LEAST_LEVER_M = 0.004  # of a hand's model; the axes of one chip are a millimetre apart
 SPREAD_S2 = 0.02**2  # standard deviation of a filter's spread: the square of the delay of a chip's slowest one
 
 
@@ -87,7 +87,7 @@ def find_hand_effects(
     """
     S, g, taken = _weigh_effects(problem, smoothed_rates(recording, flat), minimum, prior)
     likely, r = None, -np.linalg.lstsq(S[:3, :3], g[:3], rcond=None)[0]
-    if r @ S[:3, :3] @ r > most_chi2(3, RARE_STD) and norm(r) > MOST_STD * LEAST_LEVER_M:
+    if r @ S[:3, :3] @ r > most_chi2(3) and norm(r) > LEAST_LEVER_M:
         likely = f"a lever arm of {1e3 * norm(r):.0f} mm"
     information = max(S[3, 3], np.finfo(np.float64).tiny)  # of rates that never change it is 0, or rounded below that
     tau, expected, precision = -g[3] / information, *(x[PLACES["tau"]].item() for x in (prior.mean, prior.precision))
@@ -95,13 +95,13 @@ def find_hand_effects(
     std = math.sqrt(1.0 / information + 1.0 / precision + (0.5 * step_s) ** 2)
     if abs(tau - expected) > MOST_STD * std:
         likely = f"a delay of {1e3 * tau:.0f} ms"
-    precisions = np.array([*[LEAST_LEVER_M**-2] * 3, precision, SPREAD_S2**-2])
+    precisions = np.array([*[(2.5 * LEAST_LEVER_M) ** -2] * 3, precision, SPREAD_S2**-2])
     covariance = inverse(S + np.diag(precisions))
     of_means = (float(np.median(problem.series.dt)) ** 2 - step_s**2) / 12.0  # spread of means, which is no sensor's
     x = covariance @ (precisions * [0.0, 0.0, 0.0, expected, of_means] - g)
     x[4] -= of_means
     is_filtered = x[4] > max(MOST_STD * math.sqrt(covariance[4, 4]), step_s**2)  # less may be an error of sampling
-    by_r = taken[:, :3] @ x[:3]  # an r so short may be none, so that it only widens the uncertainty
+    by_r = taken[:, :3] @ x[:3]  # an r that is not likely may be none, and only widens the uncertainty
     total = taken @ covariance @ taken.T + np.outer(by_r, by_r)
     return HandEffects(likely, by_r - taken @ x, total, float(x[4]) if is_filtered else 0.0)
 
