@@ -170,7 +170,8 @@ def find_reset(recording: Recording, flat: Flat) -> int | None:
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt, steps, gravity = np.diff(recording.t[flat.last :]), np.diff(acc, axis=0), np.linalg.norm(flat.y)
     with np.errstate(all="ignore"):
-        missed = (lengths(rate)[1:] * lengths(acc)[:-1] * dt + lengths(steps)) / gravity  # at most
+        # an upper bound, which is replaced by the angle itself where it is large
+        missed = (lengths(rate)[1:] * lengths(acc)[:-1] * dt + lengths(steps)) / gravity
         far = np.flatnonzero(missed > LEAST_TURN_RAD)
         missed[far] = lengths(cross_rows(rate[far + 1], acc[far]) * dt[far, None] + steps[far]) / gravity
         for i in far[(missed[far] > LEAST_TURN_RAD) & ~recording.gap[flat.last + 1 :][far]]:
@@ -363,8 +364,8 @@ def _explains_gravity(recording: Recording, first: int, last: int) -> bool:
     at = np.linspace(first, last - 1, pieces + 1).astype(np.intp)
     around = np.clip(np.stack([at - n // 8, at + n // 8 + 1], axis=1), 0, len(recording))
     up = units(statistics(recording.acc, around)[0])
-    steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - recording.gyr[:n].mean(axis=0))
-    steps = steps[first : at[-1] + 1]
+    t, rates = recording.t[first:last], recording.gyr[first:last] - recording.gyr[:n].mean(axis=0)
+    steps = np.diff(t, prepend=t[0])[:, None] * rates
     carried = turned(-steps, np.stack([at[:-1], at[1:]], axis=1) + 1 - first) @ up[:-1, :, None]
     return bool(lengths(carried[:, :, 0] - up[1:]).sum() < 0.1 * lengths(steps).sum())
 

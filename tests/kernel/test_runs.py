@@ -29,6 +29,13 @@ def test_a_turn_is_the_product_of_its_steps_and_turns_vectors_that_enter_on_the_
         _kernel.turn(x, np.array([[190, 201]]))
 
 
+def test_lengths_of_vectors(x):
+    for of in (x, x[::2], x[:0], np.arange(6).reshape(2, 3)):  # also of arrays that are copied first
+        np.testing.assert_allclose(_kernel.lengths(of), np.linalg.norm(of, axis=1), rtol=1e-15)
+    with pytest.raises(ValueError, match="holds 10 numbers, not 9"):
+        _kernel.lengths(np.ones((5, 2)))
+
+
 def test_means_and_variances_of_runs(x):
     runs = np.array([[0, 1], [5, 80], [70, 200]])
     mean, variance = _kernel.statistics(10.0 + x, runs)

@@ -17,10 +17,10 @@ from .recording import SEPARABLE_HZ
 
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
-# How far |a| strays, in units of its change of course within 10 ms, and this change for each rad/s by which the rates
-# change theirs [m/s^2]. In hands the first is at most 30, or the second at least 0.6; on machines the second is 10 to
+# How far |a| strays, in units of its change of course within 10 ms, and this change divided by that of the rates [m/s^2
+# for each rad/s]. In hands the first is at most 30, or the second at least 0.6; on machines the second is 10 to
 # 30; in the gravity of a fusion filter the first is at least 76, and the second at most 0.35.
-SMOOTH, LEAST_BENT_M = 66.0, 0.5
+SMOOTH, LEAST_BENT_MPS = 66.0, 0.5
 # Errors of readings by a change of the sensor: smaller ones are not reported, larger ones of its matrix refused.
 LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
@@ -75,7 +75,7 @@ def not_converged(e: Evidence) -> Reason | None:
 def smoothed(e: Evidence) -> Reason | None:
     """Find accelerations that were computed or smoothed: only what a hand does below 3 Hz is left of its motion."""
     away, bent, of_rates = e.magnitude_errors
-    if not away > SMOOTH * bent or bent > LEAST_BENT_M * of_rates or e.recording.sensor.origin is Origin.VEHICLE:
+    if not away > SMOOTH * bent or bent > LEAST_BENT_MPS * of_rates or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     return reason("not_raw", "smoothed", away=away, bent=bent)
 
