@@ -6,6 +6,7 @@ travel (kernel/filter.hpp and kernel/hand.hpp).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-from .parameters import ACCEL, HAND, IMU, LANES, LANES_OF_S, LAYOUT, lanes_used
-from .problem import SERIES, SERIES_OF_A_HAND, Problem
+from .parameters import ACCEL, HAND, IMU, LANES, LANES_OF_S, LAYOUT, NAMES, lanes_used
+from .problem import SERIES, SERIES_OF_A_HAND, Problem, Series
 from .theta import Theta
 
 if _kernel.layout != LAYOUT:
@@ -94,6 +95,28 @@ def part_scores(problem: Problem, theta: Theta, parameters: int, to_ends: tuple[
         np.diff(fisher, axis=0, prepend=begin.fisher[None]),
         begin,
     )
+
+
+def slope_by_noise(problem: Problem, theta: Theta) -> Vector:
+    """Return minus the mean of the gradient of V (p,) at the true parameters, which the rates' noise makes by K.
+
+    The rates are in the derivatives by K, with the noise that is in the innovations, too ("errors in variables"). So
+    the gradient's mean is minus the sum of tr(S^-1 dS/dK) / 2 over the samples, where S depends on K by the noise. A
+    factor of an axis' K acts on S as the square root of its noise's variance does, inversely. The exact filter is used
+    for a hand, too.
+    """
+    exact, step = Series(**problem.series.arrays(SERIES)), 0.02
+
+    def log_det(factor: Vector | float) -> float:
+        """Return the sum of log det S / 2 with the variance of the rates' noise multiplied by a factor."""
+        flat = replace(problem.flat, Sigma_omega=problem.flat.Sigma_omega * factor)
+        at = evaluate(Problem(exact, flat, problem.gravity), theta, 0)
+        return at.V - 0.5 * at.squares
+
+    slope, here = np.zeros(len(NAMES)), log_det(1.0)
+    for name, axis in zip(("K_xx", "K_yy", "K_zz"), np.eye(3), strict=True):
+        slope[NAMES.index(name)] = 2.0 * (here - log_det(np.exp(step * axis))) / step
+    return slope
 
 
 def value(problem: Problem, theta: Theta) -> float:

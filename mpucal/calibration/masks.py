@@ -89,9 +89,11 @@ def with_masks(recording: Recording) -> Recording:
 
 def _beyond_range(recording: Recording) -> Vector:
     """Return the rates (n, 3), short runs of clipped ones replaced by what the slopes on both sides suggest."""
+    if not recording.gyr_clipped.any():
+        return recording.gyr
     gyr = recording.gyr.copy()
     n, longest = max(round(SMOOTH_S * recording.rate_hz), 1), BRIDGED_S * recording.rate_hz
-    for column in gyr.T if recording.gyr_clipped.any() else ():
+    for column in gyr.T:
         for rail in (column.max(), column.min()):
             for first, last in true_runs(recording.gyr_clipped & (column == rail)).tolist():
                 if 1 < last - first < longest and first > n and last + n < len(column):

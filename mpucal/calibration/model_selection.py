@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Recording, Vector
+from ..data import Recording
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
@@ -22,10 +22,10 @@ from .hand import PASSES, HandFit, fit_hand
 from .hypothesis_tests import MOST_STD, WALD_99, HandEffects, by_filter, find_hand_effects, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import LAST, MOST_ITERATIONS, ROUGHLY, Minimum, minimise
-from .likelihood import evaluate
+from .likelihood import evaluate, slope_by_noise
 from .masks import mask
 from .paper import fit_paper
-from .parameters import ACCEL, IMU, NAMES
+from .parameters import ACCEL, IMU
 from .preprocessing import smoothed_rates
 from .problem import Problem, Series
 from .rotation import lengths
@@ -220,19 +220,8 @@ class InPlaceFits:
 
     @cached_property
     def _with_matrix(self) -> Prior:
-        """Prior with the slope by K that the noise of the rates takes away ("errors in variables").
-
-        The rates are in the derivatives by K, with the noise that is in the innovations, too. So the gradient's mean at
-        the true K is minus the sum of tr(S^-1 dS/dK) / 2 over the samples, where S depends on K by the noise. A factor
-        of an axis' K acts on S as the square root of its noise's variance does, inversely.
-        """
-        problem, theta = self._thin, self._rough(ACCEL).theta
-        slope, step = np.zeros(len(NAMES)), 0.02
-        for name, axis in zip(("K_xx", "K_yy", "K_zz"), np.eye(3), strict=True):
-            more, less = (evaluate(_with_noise(problem, np.exp(sign * step * axis)), theta, 0) for sign in (1.0, -1.0))
-            of_S = (more.V - 0.5 * more.squares) - (less.V - 0.5 * less.squares)  # of the sum of log det S / 2
-            slope[NAMES.index(name)] = -of_S / step
-        return replace(self._without_matrix, slope=slope)
+        """Prior with the slope by K that the noise of the rates takes away."""
+        return replace(self._without_matrix, slope=slope_by_noise(self._thin, self._rough(ACCEL).theta))
 
     @cached_property
     def _most_nis(self) -> float:
@@ -280,11 +269,6 @@ class InPlaceFits:
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
     series = with_sampling_errors(mask(Series.after(recording, flat), recording, flat), recording, flat)
     return Problem(series, flat, gravity)
-
-
-def _with_noise(problem: Problem, factor: Vector) -> Problem:
-    """Return the problem with the variance of the rates' noise multiplied by a factor (3,)."""
-    return replace(problem, flat=replace(problem.flat, Sigma_omega=problem.flat.Sigma_omega * factor))
 
 
 def _with_errors(problem: Problem, errors: Errors) -> Problem:

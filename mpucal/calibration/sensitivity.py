@@ -22,7 +22,8 @@ from .fit import Fit
 from .hand import PASSES
 from .hypotheses import SURE, Explanation, gyroscope_change, rank, unseen_changes
 from .hypothesis_tests import most_chi2
-from .likelihood import evaluate, part_scores
+from .levenberg_marquardt import DECREMENT, LAST
+from .likelihood import evaluate, part_scores, slope_by_noise
 from .model_selection import HOPELESS_NIS
 from .normal_equations import inverse
 from .parameters import HAND, NAMES, SENSITIVE
@@ -66,7 +67,7 @@ def find_sensitivity(
     prepared = prepare(thin, at, RestFinder(thin, rest).typical(), gravity)
     if prepared.rests_often and gyroscope_change(explanations) is None:  # a machine's slow turns pass for rests
         return None
-    problem, prior = replace(prepared.white(0.0), huber=np.inf).with_forces(), prepared.prior()
+    problem = replace(prepared.white(0.0), huber=np.inf).with_forces()
     series, ends = problem.series, ends_of(problem)
     assert series.force is not None
     if ends is None:
@@ -74,6 +75,7 @@ def find_sensitivity(
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
     start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
+    prior = replace(prepared.prior(), slope=slope_by_noise(problem, theta))
     precision = prior.precision_with_sensitivity
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
     for _ in range(PASSES):
@@ -81,12 +83,15 @@ def find_sensitivity(
         found = evaluate(less, theta, SENSITIVE, ends)
         H = found.fisher + np.diag(precision)
         C = inverse(H)
-        step = -C @ (found.gradient + np.append(prior.gradient(theta), SENSITIVITY_SD**-2 * S))
+        gradient = found.gradient + np.append(prior.gradient(theta), SENSITIVITY_SD**-2 * S)
+        step = -C @ gradient
         before, theta, S = theta, theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
         known, s = inverse(C[HAND:, HAND:]), S.ravel()
         evidence = 0.5 * float(s @ known @ s - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
         if not evidence > -np.log(SURE):
             return None
+        if -0.5 * (step @ gradient) < LAST * DECREMENT:
+            break
     left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
     assert found.to_ends is not None
     beside = explanations

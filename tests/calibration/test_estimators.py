@@ -9,12 +9,14 @@ import pytest
 
 from mpucal.calibration import calibrate, likelihood, parameters
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
+from mpucal.calibration.hypotheses import rank
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import MOST_ITERATIONS, _nearer, minimise
 from mpucal.calibration.model_selection import METHODS, choose_model
 from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES, K_NAMES
 from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.sensitivity import find_sensitivity
 from mpucal.calibration.theta import Prior
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
@@ -142,6 +144,15 @@ def test_noise_as_large_as_the_rates_makes_no_scale_factor_error():
     assert np.abs(z).max() < 4.0
     assert (np.abs(z.mean(axis=0)) < 4.0 / np.sqrt(len(runs))).all()
     assert [by(choose_model, run.recording).model for run in runs[:4]] == ["accel"] * 4
+
+
+@pytest.mark.parametrize("seed", [0, 3, 10, 11])
+def test_noise_as_large_as_the_rates_makes_no_sensitivity_to_acceleration(seed):
+    recording = paper_scenario(seed, turn_s=50.0).recording
+    fit = by(METHODS["accel"], recording)
+    flat = flat_statistics(recording, recording.flat)
+    found = find_sensitivity(recording, flat, G, fit, rank(fit.parts, fit.D))
+    assert found is None or not found.S.any()
 
 
 # ---- a lever arm
