@@ -40,6 +40,15 @@ def test_a_sensor_that_stays_the_same_did_not_change(hand, motion):
         assert error["model"] <= error["rms"] < 1.1 * error["model"]
 
 
+@pytest.mark.parametrize("seed", [3, 7, 10])
+def test_long_rests_of_a_trembling_hand_show_no_change(hand, seed):
+    """Hold eight orientations for 8 s each: D could take nearly all that a change would do to so few."""
+    run = hand(seed, "pose8 slow", tremble=True)
+    calibration = calibrate(run.recording, "auto", G)
+    assert calibration.verdict == "good"
+    assert judged(calibration, (run.truth.D, run.truth.b_a)).farthest < 3.0
+
+
 @pytest.mark.parametrize("what", ["bias", "scale"])
 def test_each_element_holds_what_a_changed_sensor_was_and_became(hand, what):
     """Change a sensor in the middle of its recording, and compare with its parameters (12,) before and after."""

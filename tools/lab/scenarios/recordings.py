@@ -34,12 +34,12 @@ def evenly(turns: Vector, move_s: float, step_s: float, whole_s: float = MOVING_
     return along([Leg(turn, move_s, whole_s / len(turns) - move_s) for turn in turns], step_s)
 
 
-def poses(step_s: float, rng: Rng, n: int) -> Course:
-    """Draw n still orientations, the flat one among them, by moves of 50 to 130 deg about x, y, z in turn."""
+def poses(step_s: float, rng: Rng, n: int, whole_s: float = MOVING_S) -> Course:
+    """Draw n still orientations in whole_s, the flat one too, by moves of 50 to 130 deg about x, y, z in turn."""
     m = n - 1
     about = np.eye(3)[np.arange(m) % 3] * rng.choice([-1.0, 1.0], m)[:, None]
     turns = about * np.radians(rng.uniform(50, 130, m))[:, None] + rng.uniform(-SLOPPY_RAD, SLOPPY_RAD, (m, 3))
-    return evenly(turns, 1.6, step_s)
+    return evenly(turns, 1.6, step_s, whole_s)
 
 
 def three_orientations(step_s: float, rng: Rng) -> Course:
@@ -89,6 +89,7 @@ def _scene(motion: Motion, hand: Hand = HAND, chip: Chip = BY_HAND) -> Family:
 SCENES = {
     "pose6": _scene(six_faces),
     "pose7": _scene(partial(poses, n=7)),
+    "pose8 slow": _scene(partial(poses, n=8, whole_s=70.0)),
     "pose9": _scene(partial(poses, n=9)),
     "pose12": _scene(partial(poses, n=12)),
     "check": _scene(three_orientations),
