@@ -98,10 +98,6 @@ SURE = 100.0
 LEAST_EVIDENCE = 0.7
 # Share of the largest eigenvalue below which a direction of x is left out: the parts hardly determine it.
 UNSEEN = 3e-4
-# So is one of whose information the parameters leave less than this share, unless other directions show that something
-# happened: errors of the model are as large. Long rests in a trembling hand left 0.0001 to 0.02, and changes of a
-# sensor mostly 0.045 or more.
-LEAST_LEFT = 0.02
 PULSES = (1, 2, 3)  # groups that a pulse lasts
 
 
@@ -191,15 +187,12 @@ def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Ex
 def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Explanation]:
     """Return an explanation by each hypothesis with its posterior probability, the likeliest first."""
     groups = {number: _Groups.of(parts, number) for number in {GROUPS[each.shape] for each in hypotheses}}
-    for least_left in (LEAST_LEFT, 0.0):
-        found = [
-            each
-            for shape, alike in groupby(hypotheses, key=lambda each: each.shape)
-            for each in _explain(list(alike), groups[GROUPS[shape]], parts, D, least_left)
-        ]
-        total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # 0: the null hypothesis
-        if not total > np.log(SURE):
-            break
+    found = [
+        each
+        for shape, alike in groupby(hypotheses, key=lambda each: each.shape)
+        for each in _explain(list(alike), groups[GROUPS[shape]], parts, D)
+    ]
+    total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # 0: the null hypothesis
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.weight)
     if total > np.log(SURE):
@@ -269,12 +262,11 @@ class _Likelihood(NamedTuple):
 
     Attributes
     ----------
-    eigenvalues, scores : (h, m, d). known : (h, m, d), what the eigenvalues are for a known theta.
-    strays : (h, m, d, p), error of the estimated parameters by a unit of a component. U : (h, m, r, 3, d) eigenvectors.
+    eigenvalues, scores : (h, m, d). strays : (h, m, d, p), error of the estimated parameters by a unit of a component.
+    U : (h, m, r, 3, d) eigenvectors.
     """
 
     eigenvalues: Vector
-    known: Vector
     scores: Vector
     strays: Vector
     U: Vector
@@ -294,32 +286,27 @@ class _Likelihood(NamedTuple):
         own = (across @ B[:, None]).transpose(0, 1, 3, 2)[..., None]  # (h, 3, 3, k, 1)
         across = (weights @ across).reshape(h, 3, m, r, p).transpose(0, 2, 3, 1, 4).reshape(h, m, 3 * r, p)
         follow = across @ parts.covariance
-        F = (pairs.reshape(axes, axes, -1, k) @ own).reshape(h, 3, 3, m, r, r)
-        F = F.transpose(0, 3, 4, 1, 5, 2).reshape(h, m, 3 * r, 3 * r)
-        eigenvalues, U = np.linalg.eigh(F - follow @ across.swapaxes(2, 3))
-        known = np.sum(F @ U * U, axis=2)
+        S = (pairs.reshape(axes, axes, -1, k) @ own).reshape(h, 3, 3, m, r, r)
+        S = S.transpose(0, 3, 4, 1, 5, 2).reshape(h, m, 3 * r, 3 * r)
+        eigenvalues, U = np.linalg.eigh(S - follow @ across.swapaxes(2, 3))
         of_groups = weights @ (groups.gradient @ B).swapaxes(1, 2)[..., None]  # (h, 3, m r, 1)
         of_x = follow @ parts.left - of_groups.reshape(h, 3, m, r).transpose(0, 2, 3, 1).reshape(h, m, 3 * r)
         scores = (of_x[:, :, None] @ U)[:, :, 0]
         follow += (flat[:, :, :, None] * B.swapaxes(1, 2)[:, None, None]).reshape(follow.shape)
-        return cls(np.maximum(eigenvalues, 0.0), known, scores, U.swapaxes(2, 3) @ follow, U.reshape(h, m, r, 3, -1))
+        return cls(np.maximum(eigenvalues, 0.0), scores, U.swapaxes(2, 3) @ follow, U.reshape(h, m, r, 3, -1))
 
-    def seen(self, least_left: float) -> _Likelihood:
+    def seen(self) -> _Likelihood:
         """Return it without the directions of x that the parts hardly determine."""
-        eigenvalues, known, scores, strays, U = self
-        least = np.maximum(UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True), least_left * known)
-        is_seen = eigenvalues > least
-        scores, strays, U = scores * is_seen, strays * is_seen[..., None], U * is_seen[:, :, None, None]
-        return _Likelihood(eigenvalues, known, scores, strays, U)
+        eigenvalues, scores, strays, U = self
+        is_seen = eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True)
+        return _Likelihood(eigenvalues, scores * is_seen, strays * is_seen[..., None], U * is_seen[:, :, None, None])
 
 
-def _explain(
-    alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector, least_left: float = 0.0
-) -> list[Explanation]:
+def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector) -> list[Explanation]:
     """Return explanations by hypotheses of one shape, in their order."""
     B = np.array([_directions(each.what, D, len(parts.H)) for each in alike])
     shapes = _shapes(alike[0].shape, groups)
-    likelihood = _Likelihood.of(B, shapes, groups, parts).seen(least_left)
+    likelihood = _Likelihood.of(B, shapes, groups, parts).seen()
     q = np.outer([LARGEST[each.what] ** 2 for each in alike], VARIANCES)[:, None, :, None]
     # (h, m, q, d): by hypothesis, by shape, by variance, by component
     eigenvalues, c = likelihood.eigenvalues[:, :, None], likelihood.scores[:, :, None]

@@ -127,7 +127,7 @@ def value(problem: Problem, theta: Theta) -> float:
 class Trace(NamedTuple):
     """Predictions of the hand's filter for every sample, (n, 3) each.
 
-    innovation : whitened, L^-1 e. s, a : m/s^2, gravity and the hand's acceleration in the body frame, as predicted.
+    innovation : whitened, L^-1 e. s : m/s^2, gravity in the body frame. a : m/s^2, the hand's acceleration as read.
     """
 
     innovation: NDArray[np.float64]

@@ -1,8 +1,8 @@
 // Filter for a sensor that a hand moves: gravity and the hand's bounded travel. Arrays in, numbers out.
 //
 // The state is four vectors in the body frame, s gravity (|s| = g), p, v, a the hand's travel, speed and
-// acceleration; x = (s, p, v, a), P its covariance:
-//   e = y - D (E s + a + L r) - b_a,  E = I + tau [omega]x,  L = [alpha]x + [omega]x^2,  S = H P H' + R
+// acceleration, as the accelerometer reads it; x = (s, p, v, a), P its covariance:
+//   e = y - D (E s + L r) - a - b_a,  E = I + tau [omega]x,  L = [alpha]x + [omega]x^2,  S = H P H' + R
 //   x <- x + K e,  s <- g s / |s|,  P <- P - K H P,  K = P H' (H P H' + R / w)^-1
 //   x <- F x,  F = exp(-dt [Gyro (omega_bar - b_omega)]x),  then (p, v, a) by the chain of chain.hpp
 // and V = sum of rho(e' S^-1 e) + 1/2 log det S; rho is Huber's, or redescends, and w is its weight.

@@ -9,7 +9,7 @@ namespace {  // each instruction set has its own copy
 // Shared coefficients of the derivatives of four steps
 struct HandCoefficients {
   Lane white[3][3], residual[3];                // sqrt(w) L^-1, and its product with e
-  Lane q[4];                                    // E s + a + L r in the body, and 1
+  Lane q[4];                                    // E s + L r in the body, and 1
   Lane delay[3], lever[4][3];                   // D [omega]x s, D L
   Lane direction[3], stretch;                   // of s after the update
   Lane eta_b[4][3], eta_K[4][3], eta_K2[4][3];  // of d(F x) = eta x (F x), in the first frame
@@ -33,14 +33,13 @@ struct HandCoefficients {
   }
 
   MPUCAL_INLINE void measurement(const HandParameters& p, const HandSteps& steps, const HandPredicted& met) {
-    Lane s[3], a[3], swept[3], sum[3], DL[3][3];
+    Lane s[3], swept[3], sum[3], DL[3][3];
     multiply(steps.C, met.s, s);
-    multiply(steps.C, met.a, a);
     const Lane(&w)[3] = steps.omega;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
       swept[i] = nmadd(w[k], s[j], w[j] * s[k]);
-      sum[i] = madd(p.tau, swept[i], s[i] + a[i] + steps.L_r[i]);
+      sum[i] = madd(p.tau, swept[i], s[i] + steps.L_r[i]);
     }
     turn_round(sum, 1.0, q);
     multiply(p.D, swept, delay);
@@ -126,7 +125,7 @@ class HandDerivatives {
       if constexpr (g == Lanes::tau / 4) e[j] = nmadd(at(c.delay[j], t), kTau, e[j]);
       if constexpr (g == Lanes::r / 4) e[j] = e[j] - c.lever[t][j];
       for (int b = 0; b < 3; ++b)
-        e[j] = nmadd(at(four.Ha[j][b], t), x[b][kA], nmadd(at(four.Hs[j][b], t), x[b][kS], e[j]));
+        e[j] = nmadd(at(four.C[j][b], t), x[b][kA], nmadd(at(four.Hs[j][b], t), x[b][kS], e[j]));
     }
   }
 

@@ -80,9 +80,9 @@ class HandRecursion {
     for (int a = 0; a < 3; ++a)
       for (int j = 0; j < 3; ++j) {
         A[a][j] = at(four.Hs[j][0], t) * P_[0][a][kS];
-        A[a][j] = madd(at(four.Ha[j][0], t), P_[0][a][kA], A[a][j]);
+        A[a][j] = madd(at(four.C[j][0], t), P_[0][a][kA], A[a][j]);
         for (int b = 1; b < 3; ++b)
-          A[a][j] = madd(at(four.Ha[j][b], t), P_[b][a][kA], madd(at(four.Hs[j][b], t), P_[b][a][kS], A[a][j]));
+          A[a][j] = madd(at(four.C[j][b], t), P_[b][a][kA], madd(at(four.Hs[j][b], t), P_[b][a][kS], A[a][j]));
       }
   }
 
@@ -92,14 +92,14 @@ class HandRecursion {
       R[j] = at(four.R[j], t);
       e[j] = at(four.y[j], t);
       for (int a = 0; a < 3; ++a)
-        e[j] = nmadd(at(four.Ha[j][a], t), at(x_[a], kA), nmadd(at(four.Hs[j][a], t), at(x_[a], kS), e[j]));
+        e[j] = nmadd(at(four.C[j][a], t), at(x_[a], kA), nmadd(at(four.Hs[j][a], t), at(x_[a], kS), e[j]));
     }
     for_each<6>([&](auto m) {
       constexpr int i = kRow[m], j = kCol[m];
       double by_s = i == j ? R[i] : 0.0, by_a = 0.0;
       for (int a = 0; a < 3; ++a) {
         by_s = madd(at(four.Hs[i][a], t), at(A[a][j], kS), by_s);
-        by_a = madd(at(four.Ha[i][a], t), at(A[a][j], kA), by_a);
+        by_a = madd(at(four.C[i][a], t), at(A[a][j], kA), by_a);
       }
       S[m] = by_s + by_a;
     });

@@ -15,7 +15,7 @@ constexpr double kLongestStep = 0.2;  // s: the hand's travel is practically for
 struct HandSteps : Given {
   Lane omega[3], L[3][3], L_r[3];   // rate and lever arm's matrix at the measurement
   Lane C[3][3], C_next[3][3];       // the turn at the measurement, and after the step's
-  Lane Hs[3][3], Ha[3][3];          // derivatives of the measurement by s and a: D E C and D C
+  Lane Hs[3][3];                    // derivative of the measurement by s, D E C; that by a is C
   Chain chain;
   Lane column[4][3], noise[4][3];   // [step][k] of the triangle Phi, in the places of a, b, c; of jerk Q
   Lane c_first[6];                  // C_next' diag(c) C_next
@@ -85,7 +85,6 @@ struct HandSteps : Given {
       DE[j][2] = madd(p.tau, nmadd(d[1], omega[0], d[0] * omega[1]), d[2]);
     }
     multiply(DE, C, Hs);
-    multiply(p.D, C, Ha);
   }
 
   MPUCAL_INLINE void travel(const HandSeries& series, const HandConstants& constants, long k) {

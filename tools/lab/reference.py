@@ -166,8 +166,8 @@ class Pass:
         at, x = self.at, self.x
         E = np.eye(3) + tau[:, None, None] * cross(rate)
         L = cross(alpha) + cross(rate) @ cross(rate)
-        e = y - times(at.D, times(E, x[:, :3]) + x[:, 9:] + at.r @ L.T) - at.b_a
-        H = self.theta.D @ np.hstack([E[-1].real, np.zeros((3, 6)), np.eye(3)])
+        e = y - times(at.D, times(E, x[:, :3]) + at.r @ L.T) - x[:, 9:] - at.b_a
+        H = np.hstack([self.theta.D @ E[-1].real, np.zeros((3, 6)), np.eye(3)])
         gain = self._gain(H, e[-1].real, np.diag(R), huber) if self.held is None else self.held[len(self.gains)]
         de = e[:-1].imag / STEP
         self.gains.append(gain)
