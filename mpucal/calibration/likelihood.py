@@ -127,12 +127,11 @@ def value(problem: Problem, theta: Theta) -> float:
 class Trace(NamedTuple):
     """Predictions of the hand's filter for every sample, (n, 3) each.
 
-    innovation : whitened, L^-1 e. s : m/s^2, gravity in the body frame. a : m/s^2, the hand's acceleration as read.
+    innovation : whitened, L^-1 e. s : m/s^2, gravity in the body frame.
     """
 
     innovation: NDArray[np.float64]
     s: NDArray[np.float64]
-    a: NDArray[np.float64]
 
 
 def trace(problem: Problem, theta: Theta) -> Trace:

@@ -50,7 +50,7 @@ def trace_hand(
     jerk: NDArray[numpy.float64] | None = None,
     reset: NDArray[numpy.float64] | None = None,
     force: NDArray[numpy.float64] | None = None,
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def moments(
     b_omega: NDArray[numpy.float64],
     y: NDArray[numpy.float64],

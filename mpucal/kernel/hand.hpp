@@ -38,7 +38,6 @@ struct HandConstants : Constants {
 struct HandResult : Result {
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
-  double* motion;      // (n, 3) a before the update
 };
 
 using EvaluateHand = void (*)(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);

@@ -10,7 +10,7 @@ namespace {
 constexpr int kFours = 4;  // processed together, so that shared values stay in the first cache
 constexpr long kBlock = 4 * kFours;
 
-// Whitened innovations, s and a of the samples among these steps
+// Whitened innovations and s of the samples among these steps
 void trace(const HandSteps* steps, const HandPredicted* predicted, long k, int count, HandResult& result) {
   for (int i = 0; i < count; ++i) {
     const long sample = k + i - 1;
@@ -18,15 +18,13 @@ void trace(const HandSteps* steps, const HandPredicted* predicted, long k, int c
     const HandSteps& four = steps[i / 4];
     const HandPredicted& met = predicted[i / 4];
     const int t = i % 4;
-    Lane white[3][3], residual[3], s[3], a[3];
+    Lane white[3][3], residual[3], s[3];
     whitener(met.S, Adjugate<Lane>(met.S), white);
     multiply_lower(white, met.e, residual);
     multiply(four.C, met.s, s);
-    multiply(four.C, met.a, a);
     for (int j = 0; j < 3; ++j) {
       result.innovation[3 * sample + j] = at(residual[j], t);
       result.gravity[3 * sample + j] = at(s[j], t);
-      result.motion[3 * sample + j] = at(a[j], t);
     }
   }
 }

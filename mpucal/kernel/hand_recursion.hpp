@@ -12,7 +12,7 @@ constexpr int kState = 4, kS = 0, kA = 1;  // places of s and a in (s, a, b, c)
 
 // State before and effect of four measurements, one to a lane or [step]
 struct HandPredicted {
-  Lane s[3], a[3];             // of x before the measurement
+  Lane s[3];                   // of x before the measurement
   Lane e[3], S[6], w;          // w: the robust weight
   Lane plus[3];                // s + K e
   Lane K[4][3][3];             // [step][axis][measurement], of (s, a, b, c)
@@ -108,7 +108,6 @@ class HandRecursion {
   MPUCAL_INLINE void keep(const double (&e)[3], const double (&S)[6], int t, HandPredicted& kept) const {
     for (int a = 0; a < 3; ++a) {
       put(kept.s[a], t, at(x_[a], kS));
-      put(kept.a[a], t, at(x_[a], kA));
       put(kept.e[a], t, e[a]);
     }
     for (int m = 0; m < 6; ++m) put(kept.S[m], t, S[m]);

@@ -216,20 +216,18 @@ NB_MODULE(_kernel, m) {
             make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset, force);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
-        std::vector<double> innovation(3 * series.n), gravity(3 * series.n), motion(3 * series.n);
+        std::vector<double> innovation(3 * series.n), gravity(3 * series.n);
         HandResult result{};
         result.innovation = innovation.data();
         result.gravity = gravity.data();
-        result.motion = motion.data();
         without_gil([&] { evaluate_hand(parameters, series, values, result); });
         const std::size_t n = series.n;
-        return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
-                               give(std::move(motion), {n, 3}));
+        return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), optional("r_scale"),
       optional("q_scale"), optional("q_extra"), optional("rate"), optional("alpha"), optional("r_extra"),
       optional("jerk"), optional("reset"), optional("force"),
-      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
+      "Return whitened innovations and predicted gravity, (n, 3) each, of the hand's filter.");
 
   m.def(
       "moments",

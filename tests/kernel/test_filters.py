@@ -116,8 +116,6 @@ def test_a_trace_has_the_innovations_of_the_value(hand_problem, theta, instructi
     at = trace(hand_problem, theta)
     assert (at.innovation**2).sum() == pytest.approx(evaluate(hand_problem, theta, HAND).squares, rel=1e-12)
     np.testing.assert_allclose(np.linalg.norm(at.s, axis=1), hand_problem.gravity, rtol=1e-12)
-    assert (at.a[[50, 80]] == 0.0).all()
-    assert abs(at.a[[49, 51, 79, 82]]).min() > 0.0
 
 
 @pytest.mark.parametrize(
