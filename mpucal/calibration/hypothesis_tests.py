@@ -26,7 +26,7 @@ MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance e
 RARE_STD = 2.326  # those that chance exceeds in one case of a hundred: enough for parameters that do no harm
 KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
 LEAST_LEVER_M = 0.004  # of a hand's model; the axes of one chip are a millimetre apart
-SPREAD_S2 = 0.02**2  # standard deviation of a filter's spread: the square of the delay of a chip's slowest one
+LAG_S = 0.02  # delay by a chip's slowest filter; with one clock, filters leave 10 ms between the sensors at most
 
 
 def most_chi2(n: int, deviate: float = MOST_STD) -> float:
@@ -95,7 +95,8 @@ def find_hand_effects(
     std = math.sqrt(1.0 / information + 1.0 / precision + (0.5 * step_s) ** 2)
     if abs(tau - expected) > MOST_STD * std:
         likely = f"a delay of {1e3 * tau:.0f} ms"
-    precisions = np.array([*[(2.5 * LEAST_LEVER_M) ** -2] * 3, precision, SPREAD_S2**-2])
+    # A low-pass filter spreads by about the square of its delay.
+    precisions = np.array([*[(2.5 * LEAST_LEVER_M) ** -2] * 3, precision, LAG_S**-4])
     covariance = inverse(S + np.diag(precisions))
     of_means = (float(np.median(problem.series.dt)) ** 2 - step_s**2) / 12.0  # spread of means, which is no sensor's
     x = covariance @ (precisions * [0.0, 0.0, 0.0, expected, of_means] - g)
@@ -122,12 +123,13 @@ def _weigh_effects(
         of_spread = replace(series, rate=rates[0], alpha=rates[1], **still, **moved)
         return evaluate(replace(problem, series=of_spread), theta, HAND)
 
-    less, at, more = map(filtered, (-SPREAD_S2, 0.0, SPREAD_S2))
+    step = LAG_S**2
+    less, at, more = map(filtered, (-step, 0.0, step))
     free, of_hand = np.flatnonzero(minimum.free), np.arange(HAND)
     p, lanes = len(free), np.concatenate([free, of_hand[PLACES["r"]], of_hand[PLACES["tau"]]])
-    gradient = np.append(at.gradient[lanes], (more.V - less.V) / (2.0 * SPREAD_S2))
-    across = (more.gradient - less.gradient)[lanes] / (2.0 * SPREAD_S2)
-    curvature = (more.V - 2.0 * at.V + less.V) / SPREAD_S2**2
+    gradient = np.append(at.gradient[lanes], (more.V - less.V) / (2.0 * step))
+    across = (more.gradient - less.gradient)[lanes] / (2.0 * step)
+    curvature = (more.V - 2.0 * at.V + less.V) / step**2
     fisher = np.block([[at.fisher[np.ix_(lanes, lanes)], across[:, None]], [across, curvature]])
     taken = np.linalg.solve(fisher[:p, :p] + np.diag(prior.precision[free]), fisher[:p, p:])
     return fisher[p:, p:] - fisher[:p, p:].T @ taken, gradient[p:] - taken.T @ gradient[:p], taken

@@ -14,7 +14,7 @@ from ...rests.windows import WINDOW_S
 from ...result.correlation import UPPER
 from ...result.error_model import nearest_rotation, sensor_axes
 from ..evidence import Evidence, once
-from ..hypothesis_tests import MOST_STD
+from ..hypothesis_tests import LAG_S, MOST_STD
 from ..parameters import BY_NAME
 from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
@@ -27,8 +27,6 @@ SCALE_OFF, MOST_SCALE = 0.1, 2.5
 ALIKE = MOST_STD * BY_NAME["K"].sd[0]  # largest difference of three scale factors that agree on one
 # These models estimate no scale factor of the gyroscope.
 TRUSTING = ("accel", "paper", "tilt")
-# Filters of one clock leave 10 ms at most; those of an autopilot are set by its owner, and differ.
-LAG_S = 0.02
 
 
 @once
@@ -151,6 +149,7 @@ def clock_off(e: Evidence) -> Reason | None:
 
 def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
+    # The filters of an autopilot are set by its owner, and differ.
     if e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     if e.claim.change is not None or exchange(e) is not None:  # a sensor that changed looks late
